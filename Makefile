@@ -1,0 +1,56 @@
+# Everything runs in .venv, which `setup` builds from requirements.lock once and again only when it has to.
+# make PYTHON=python3.12 chooses the interpreter that .venv is built on.
+PYTHON ?=
+BIN := .venv/bin
+PYTEST := $(BIN)/python -m pytest
+NBVAL := --nbval --nbval-current-env --nbval-cell-timeout=300
+# Nothing is fetched while one works: no news, no updates, no extensions.
+LAB := --LabApp.default_url=/lab/tree/notebooks --LabApp.news_url=None --LabApp.extension_manager=readonly \
+       --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate
+# Tests of every kind; folders that are not there are left out.
+TESTS := $(wildcard tests/unit tests/integration tests/notebooks tests/benchmarks sec_lab notebooks)
+
+# Kernels come from .venv, whatever else is installed for the user; figures from the notebooks' own backend.
+export JUPYTER_PREFER_ENV_PATH := 1
+unexport MPLBACKEND
+
+.DEFAULT_GOAL := help
+.PHONY: help setup report lab test check bench notebooks lint types layers clean
+
+help:  ## list what can be made
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup:  ## build .venv from requirements.lock, if need be
+	@.ci/set_up.sh $(PYTHON)
+
+report: setup  ## execute every notebook and write build/report/index.html
+	@$(BIN)/sec-lab report
+
+lab: setup  ## open the notebooks in JupyterLab
+	@$(BIN)/jupyter lab $(LAB) $(if $(filter 0,$(shell id -u)),--allow-root)
+
+test: setup lint types layers  ## run everything that CI runs
+	@$(PYTEST) --doctest-modules --benchmark-disable $(NBVAL) $(TESTS)
+
+check: setup lint types layers  ## run the quick part of it, for every commit
+	@$(PYTEST) -q -m "not slow" $(wildcard tests/unit)
+
+bench: setup  ## print the speed tables
+	@$(PYTEST) --benchmark-only --benchmark-columns=min,median,max,ops,rounds --benchmark-sort=name tests/benchmarks
+
+notebooks: setup  ## execute the notebooks in place and store their outputs
+	@$(BIN)/python tests/notebooks/execute.py $(wildcard notebooks/*.ipynb)
+
+lint:
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+
+types:
+	@$(BIN)/mypy
+
+layers:
+	@$(BIN)/lint-imports --no-logo
+
+clean:  ## remove .venv and all that was built
+	rm -rf .venv build dist *.egg-info .benchmarks .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
