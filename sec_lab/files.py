@@ -1,0 +1,111 @@
+"""Files at the borders of the workbench: read with one clear error, written whole or not at all."""
+
+import errno
+import os
+import secrets
+from pathlib import Path
+
+
+class UnusableFileError(OSError, ValueError):
+    """A path that cannot be used as asked: missing, a directory, unreadable, damaged or hostile.
+
+    It is both an :class:`OSError` and a :class:`ValueError`, so either way of catching bad input finds it. The message
+    is one line that names the path, what was expected and what came.
+    """
+
+
+def read_whole(path: str | os.PathLike[str], *, expected: str, max_bytes: int = 1 << 28) -> bytes:
+    """Read a whole file, or say in one line why that cannot be done.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    expected : str
+        What the caller needs, for the error message, e.g. ``"a GraphML file"``.
+    max_bytes : int, optional
+        Refuse files larger than this many bytes (default 256 MiB).
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    UnusableFileError
+        If the path does not exist, is a directory, cannot be read or is too large.
+
+    Examples
+    --------
+    >>> read_whole("no/such/file.graphml", expected="a GraphML file")
+    Traceback (most recent call last):
+    ...
+    sec_lab.files.UnusableFileError: no/such/file.graphml: expected a GraphML file, but there is no such file
+    """
+    file = Path(path)
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(max_bytes + 1)
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise UnusableFileError(f"{file}: expected {expected}, but there is no such file") from error
+    except IsADirectoryError as error:
+        raise UnusableFileError(f"{file}: expected {expected}, but this is a directory") from error
+    except (OSError, ValueError) as error:
+        raise UnusableFileError(f"{file}: expected {expected}, but it cannot be read ({_reason(error)})") from error
+    if len(content) > max_bytes:
+        raise UnusableFileError(f"{file}: expected {expected} of at most {max_bytes} bytes, but it is larger")
+    return content
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write a file whole or not at all: a temporary neighbour is renamed onto it at the end.
+
+    Parameters
+    ----------
+    path : path-like
+        Where the file goes; its folder must exist. An existing file is replaced.
+    content : str or bytes
+        Text is written as UTF-8.
+
+    Raises
+    ------
+    UnusableFileError
+        If the folder does not exist, the path is a directory, the text is no UTF-8, or writing fails; nothing is left
+        behind then.
+
+    Examples
+    --------
+    >>> write_whole("no/such/folder/chain.csv", "a,b")
+    Traceback (most recent call last):
+    ...
+    sec_lab.files.UnusableFileError: no/such/folder/chain.csv: cannot be written, there is no folder no/such/folder
+    """
+    file = Path(path)
+    try:
+        _replace(file, content.encode() if isinstance(content, str) else content)
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise UnusableFileError(f"{file}: cannot be written, there is no folder {file.parent}") from error
+    except IsADirectoryError as error:
+        raise UnusableFileError(f"{file}: cannot be written, this is a directory") from error
+    except (OSError, ValueError) as error:
+        raise UnusableFileError(f"{file}: cannot be written ({_reason(error)})") from error
+
+
+def _replace(file: Path, data: bytes) -> None:
+    if file.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(file))
+    # A name may have 255 bytes, and a character up to four.
+    neighbour = file.with_name(f".{file.name[:50]}.{secrets.token_hex(4)}")
+    try:
+        with neighbour.open("xb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        neighbour.replace(file)
+    except BaseException:
+        neighbour.unlink(missing_ok=True)
+        raise
+
+
+def _reason(error: Exception) -> str:
+    return (isinstance(error, OSError) and error.strerror) or str(error)

@@ -1,0 +1,1 @@
+"""Made worlds: scenes whose truth is known, from drawn label movies to simulated arms."""
