@@ -1,0 +1,232 @@
+"""The command line: ``sec-lab COMMAND …``."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from sec_lab.event_chain import EventChain
+    from sec_lab.similarity import Match
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the command line if left out.
+
+    Returns
+    -------
+    int
+        Exit code: 0, or 1 if a notebook of the report failed, or 2 for bad input, which is explained in one line.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        code: int = options.run(options)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read the output has left; nobody is there to be told.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except (ValueError, OSError) as error:
+        _say(f"sec-lab {options.command}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        _say(f"sec-lab {options.command}: interrupted", file=sys.stderr)
+        return 130
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="sec-lab", description="Semantic event chains: compare, classify and understand manipulations."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    compare = _add_command(
+        commands,
+        "compare",
+        "how similar two manipulations are, which rows and which segments correspond",
+        "sec-lab compare seed.graphml other.graphml --normalizer shorter --tolerance 20",
+    )
+    compare.add_argument("a", type=Path, metavar="A", help="seed or model (ξ¹): GraphML or SEC.dat table")
+    compare.add_argument("b", type=Path, metavar="B", help="what is held against it (ξ²)")
+    _add_similarity_options(compare)
+    compare.set_defaults(run=_compare)
+
+    table = _add_command(
+        commands,
+        "table",
+        "the similarities of all pairs of chains, and their unsupervised classes",
+        "sec-lab table recordings/*/GraphML.xml -o table.csv",
+    )
+    table.add_argument("chains", type=Path, nargs="+", metavar="CHAIN", help="GraphML file or SEC.dat table")
+    table.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as CSV")
+    table.add_argument("--measure", choices=("temporal", "spatial"), default="temporal", help="default: temporal")
+    table.add_argument(
+        "--direction",
+        choices=("mean", "smaller", "larger", "directed"),
+        default="mean",
+        help="how both directions of a pair become one number (default: mean; directed: row = seed)",
+    )
+    _add_similarity_options(table)
+    table.set_defaults(run=_table)
+
+    report = _add_command(
+        commands,
+        "report",
+        "execute the notebooks that changed and write build/report/index.html",
+        "sec-lab report notebooks/chapter2_1_event_chains.ipynb",
+    )
+    report.add_argument("notebooks", type=Path, nargs="*", metavar="NOTEBOOK", help="only these (default: all)")
+    report.add_argument("--force", action="store_true", help="execute them even if nothing changed")
+    report.set_defaults(run=_report)
+    return parser
+
+
+def _add_command(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, what: str, example: str
+) -> argparse.ArgumentParser:
+    return commands.add_parser(
+        name,
+        help=what,
+        description=f"Show {what}." if name != "report" else f"{what.capitalize()}.",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def _add_similarity_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--normalizer",
+        choices=("longer", "shorter"),
+        default="longer",
+        help="row whose length divides in Eq. 2.2 (default: longer)",
+    )
+    command.add_argument(
+        "--tolerance",
+        type=float,
+        default=0.0,
+        metavar="PERCENT",
+        help="row similarities this close count as equal (default: 0)",
+    )
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from sec_lab.graphml import read_chain
+    from sec_lab.similarity import compare
+
+    match = compare(
+        read_chain(options.a),
+        read_chain(options.b),
+        normalizer=options.normalizer,
+        tolerance_percent=options.tolerance,
+    )
+    proof = "" if match.exact else "  (at least; the search was cut short)"
+    _say(f"spatial similarity   {match.spatial:6.2f} %")
+    _say(f"temporal similarity  {match.temporal:6.2f} %{proof}")
+    _say("\nrows")
+    row_number = {int(row): i for i, row in enumerate(match.a.changing_rows)}
+    column_number = {int(row): j for j, row in enumerate(match.b.changing_rows)}
+    lines = [
+        (_row(match.a, i), _row(match.b, j), match.row_similarity[row_number[i], column_number[j]])
+        for i, j in match.rows.tolist()
+    ]
+    width = max((len(label) for label, _, _ in lines), default=0)
+    for label_a, label_b, similarity in lines:
+        _say(f"  {label_a:<{width}}  ≈  {label_b}  ({similarity:.0f} %)")
+    _say_segments(match)
+    return 0
+
+
+def _say_segments(match: "Match") -> None:
+    from sec_lab.roles import AmbiguousRoleError, corresponding_segments
+
+    try:
+        solved, ambiguous = corresponding_segments(match), {}
+    except AmbiguousRoleError as error:
+        solved, ambiguous = error.solved, error.ambiguous
+
+    _say("\nsegments")
+    for a, b in solved.items():
+        _say(f"  {_segment(match.a, a)}  ≈  {_segment(match.b, b)}")
+    for a, options in ambiguous.items():
+        _say(f"  {_segment(match.a, a)}  ≈  {' or '.join(_segment(match.b, b) for b in options)}  (ambiguous)")
+
+
+def _segment(chain: "EventChain", segment: int) -> str:
+    name = chain.names.get(segment)
+    return f"{segment} {name}" if name else str(segment)
+
+
+def _row(chain: "EventChain", row: int) -> str:
+    return ", ".join(_segment(chain, segment) for segment in chain.pairs[row].tolist())
+
+
+def _table(options: argparse.Namespace) -> int:
+    from sec_lab.classification import unsupervised_classes
+    from sec_lab.files import write_whole
+    from sec_lab.graphml import read_chain
+    from sec_lab.similarity import similarity_table
+
+    names = _short_names(options.chains)
+    chains = {name: read_chain(path) for name, path in zip(names, options.chains, strict=True)}
+    table = similarity_table(
+        chains,
+        direction=options.direction,
+        measure=options.measure,
+        normalizer=options.normalizer,
+        tolerance_percent=options.tolerance,
+        progress=sys.stderr.isatty(),
+    )
+    if options.output is not None:
+        write_whole(options.output, table.round(6).to_csv())
+    _say(table.round(1).to_string())
+    if "exact_percent" in table.attrs:
+        _say(f"\n{table.attrs['exact_percent']:.1f} % of the pairs are proven optima")
+    if len(names) < 3:
+        _say("classes: at least three chains are needed")
+        return 0
+    classes = unsupervised_classes(table)
+    for number in sorted(set(classes.tolist())):
+        _say(f"class {number + 1}: {', '.join(n for n, c in zip(names, classes, strict=True) if c == number)}")
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    from sec_lab.report import build_report
+
+    summary = build_report(options.notebooks or None, root=Path.cwd(), force=options.force)
+    for line in summary.errors:
+        _say(line, file=sys.stderr)
+    _say(str(summary.index))
+    return 1 if summary.errors else 0
+
+
+def _short_names(paths: Sequence[Path]) -> list[str]:
+    """As few trailing parts of each path as tell all of them apart, without the ending."""
+    twice = next((path for i, path in enumerate(paths) if path in paths[:i]), None)
+    if twice is not None:
+        raise ValueError(f"{twice}: expected every chain once, got it twice")
+    for depth in range(1, max(len(path.parts) for path in paths) + 1):
+        names = ["/".join(path.with_suffix("").parts[-depth:]) for path in paths]
+        if len(set(names)) == len(names):
+            break
+    else:
+        names = [str(path) for path in paths]
+    # Files that all have the same name are told apart by their folders alone.
+    last = {path.name for path in paths}
+    return [name.rpartition("/")[0] for name in names] if depth > 1 and len(last) == 1 else names
+
+
+def _say(line: str, *, file: TextIO | None = None) -> None:
+    (file or sys.stdout).write(f"{line}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
