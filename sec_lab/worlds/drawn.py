@@ -1,6 +1,7 @@
 """Drawn label movies: the artificial *Moving Object* action (Fig. 2.5, 2.6) and the picture of A.1 (Fig. A.1).
 
-``python -m sec_lab.worlds.drawn FOLDER`` writes the labels of both samples as ``sample_1.npz`` and ``sample_2.npz``.
+``python -m sec_lab.worlds.drawn FOLDER`` writes of both samples the labels, as ``sample_1.npz`` and ``sample_2.npz``, and
+what is observed in them, as ``sample_1.graphml`` and ``sample_2.graphml``.
 """
 
 import io
@@ -14,8 +15,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sec_lab import graphml
 from sec_lab.codes import as_array
 from sec_lab.files import write_whole
+from sec_lab.pipeline import observe_segments
 
 SEED = 2012
 """Seed of the random path in sample action 2."""
@@ -213,9 +216,12 @@ def _coloured(
 def _write_samples(folder: Path) -> None:
     samples: tuple[Literal[1], Literal[2]] = (1, 2)
     for sample in samples:
+        movie = moving_object(sample)
         buffer = io.BytesIO()
-        np.savez_compressed(buffer, labels=moving_object(sample).labels)
+        np.savez_compressed(buffer, labels=movie.labels)
         write_whole(folder / f"sample_{sample}.npz", buffer.getvalue())
+        seen = observe_segments(movie.labels, relations="edge counting", names=movie.names)
+        graphml.write(folder / f"sample_{sample}.graphml", seen)
 
 
 if __name__ == "__main__":

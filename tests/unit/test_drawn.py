@@ -104,10 +104,11 @@ class TestMovingObject:
             assert stored["labels"].dtype == np.uint8
             np.testing.assert_array_equal(stored["labels"], moving_object(sample).labels)
 
-    def test_readme_names_the_checksum(self, sample: Literal[1, 2]) -> None:
-        content = (FOLDER / f"sample_{sample}.npz").read_bytes()
-        (row,) = [line for line in (FOLDER / "README.md").read_text().splitlines() if f"`sample_{sample}.npz`" in line]
-        assert hashlib.sha256(content).hexdigest() in row
+    @pytest.mark.parametrize("ending", ["npz", "graphml"])
+    def test_readme_names_the_checksum(self, sample: Literal[1, 2], ending: str) -> None:
+        name = f"sample_{sample}.{ending}"
+        (row,) = [line for line in (FOLDER / "README.md").read_text().splitlines() if f"`{name}`" in line]
+        assert hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() in row
 
 
 def test_sizes() -> None:
@@ -178,9 +179,12 @@ class TestCommand:
             [sys.executable, "-m", "sec_lab.worlds.drawn", *arguments], capture_output=True, text=True, check=False
         )
 
-    def test_writes_the_same_labels(self, tmp_path: Path) -> None:
+    def test_writes_what_is_stored(self, tmp_path: Path) -> None:
         assert self.run(str(tmp_path)).returncode == 0
-        assert sorted(path.name for path in tmp_path.iterdir()) == ["sample_1.npz", "sample_2.npz"]
+        written_names = sorted(path.name for path in tmp_path.iterdir())
+        assert written_names == ["sample_1.graphml", "sample_1.npz", "sample_2.graphml", "sample_2.npz"]
+        for name in ("sample_1.graphml", "sample_2.graphml"):
+            assert (tmp_path / name).read_bytes() == (FOLDER / name).read_bytes()
         for name in ("sample_1.npz", "sample_2.npz"):
             with np.load(tmp_path / name) as written, np.load(FOLDER / name) as stored:
                 np.testing.assert_array_equal(written["labels"], stored["labels"])
