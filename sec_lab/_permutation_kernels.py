@@ -18,6 +18,9 @@ from sec_lab._chain_kernels import (
     ordered_columns_value,
 )
 
+NOTHING = np.uint8(255)
+"""A code that no entry has."""
+
 FEW = 16
 """Up to this many permutations all are looked at; above, a bound saves more than it costs."""
 
@@ -74,7 +77,10 @@ CHOSEN = 5  # class of the d-th open row in the best permutation so far
 TRIAL = 6  # the same in the one that is tried
 CHOICE = 7  # how far the d-th open row has come in its options
 BEST_SUMS = 8  # for the alignment of columns
-OPTIONS = 9  # from here on: classes that the d-th open row may correspond to
+COMPONENT = 9  # number of the component that the d-th open row belongs to
+CLASS_COMPONENT = 10  # the same of each class, or −1
+COMPLETE = 11  # whether all rows of a component may correspond to all its classes
+OPTIONS = 12  # from here on: classes that the d-th open row may correspond to
 
 
 class Scratch(NamedTuple):
@@ -82,11 +88,12 @@ class Scratch(NamedTuple):
 
     Attributes
     ----------
-    work : (9 + m, …) int64
+    work : (12 + m, …) int64
         Rows as named above.
     table, counts : the same memory as flat uint64 and as flat uint16
         Tables of u · ⌈v / 4⌉ words of lanes, each given by where it begins. The first holds what settled rows have, the
-        second what is weighed; then come n_free + 1 of what open rows could reach and as many of what the chosen have.
+        second what is weighed; then come n_free + 1 of what open rows could reach and as many of what the chosen have;
+        behind all tables there is room for :func:`bound_of_open_rows`.
     """
 
     work: Integers
@@ -95,9 +102,11 @@ class Scratch(NamedTuple):
 
 
 @compiled
-def room_to_work(m: int, k: int, u: int, v: int) -> Scratch:
+def room_to_work(m: int, k: int, u: int, v: int, n_codes: int) -> Scratch:
     """Scratch arrays for :func:`best_permutation` on chains of up to m rows, u columns and k rows, v columns."""
-    table = np.empty(2 * (m + 3) * u * -(-v // LANES), np.uint64)
+    n_words = -(-v // LANES)
+    tables, places, rows = (2 * m + 6) * u * n_words, m * n_codes * n_words, -(-m * n_codes * u // LANES)
+    table = np.empty(tables + places + rows, np.uint64)
     return Scratch(np.empty((OPTIONS + m, max(m, k, v + 1)), np.int64), table, table.view(np.uint16))
 
 
@@ -235,27 +244,90 @@ def list_options(chains: Chains, pair: Pair, candidate: Flags, n_free: int, scra
 
 @compiled
 def bound_of_open_rows(chains: Chains, pair: Pair, n_free: int, scratch: Scratch) -> int:
-    """What no permutation can exceed: every open row gives, column by column, what any of its options could give.
+    """What no permutation can exceed, pair of columns by pair of columns.
 
+    Where all open rows of a component may correspond to all its classes, no more of them can have a certain entry in
+    common than either chain has in these two columns. In other components every row gives what any option could give.
     Table 2 + d holds this for the open rows from d on, table 1 the sum that was weighed.
     """
+    u, n_codes = pair.u, pair.n_codes
     n_words = -(-pair.v // LANES)
-    size = pair.u * n_words
-    table = scratch.table
+    size, stride = u * n_words, LANES * n_words
+    table, counts, work = scratch.table, scratch.counts, scratch.work
+    n_components = find_components(pair, n_free, scratch)
+    places = (2 * pair.m + 6) * size  # entries of each code in each column of ξ², for every component
+    rows = LANES * (places + n_components * n_codes * n_words)  # the same of the open rows of ξ¹
+    for w in range(n_components * n_codes * n_words):
+        table[places + w] = 0
+    for at in range(n_components * n_codes * u):
+        counts[rows + at] = 0
+    for j in range(pair.k):
+        if work[CLASS_COMPONENT, j] >= 0:
+            here = places + work[CLASS_COMPONENT, j] * n_codes * n_words
+            lanes = pair.lane_b + j * n_codes * n_words
+            for w in range(n_codes * n_words):
+                table[here + w] += chains.lanes[lanes + w] * np.uint64(work[ROOM, j])
     for w in range(size):
         table[(2 + n_free) * size + w] = 0
     for d in range(n_free - 1, -1, -1):
-        i = scratch.work[FREE, d]
-        this = (2 + d) * size
-        for a in range(pair.u):
-            pattern = pair.lane_b + chains.codes[pair.code_a + i * pair.u + a] * n_words
-            for w in range(n_words):
-                any_option = np.uint64(0)
-                for at in range(scratch.work[N_OPTIONS, i]):
-                    any_option |= chains.lanes[pattern + scratch.work[OPTIONS + d, at] * pair.n_codes * n_words + w]
-                table[this + a * n_words + w] = table[this + size + a * n_words + w] + any_option
+        i = work[FREE, d]
+        component = work[COMPONENT, d]
+        for a in range(u):
+            code = np.int64(chains.codes[pair.code_a + i * u + a])
+            this = (2 + d) * size + a * n_words
+            if work[COMPLETE, component]:
+                at = rows + (component * n_codes + code) * u + a
+                counts[at] += 1
+                n_rows = counts[at]
+                n_places = LANES * (places + (component * n_codes + code) * n_words)
+                for b in range(stride):
+                    counts[LANES * this + b] = counts[LANES * (this + size) + b] + (counts[n_places + b] >= n_rows)
+            else:
+                pattern = pair.lane_b + code * n_words
+                for w in range(n_words):
+                    any_option = np.uint64(0)
+                    for at in range(work[N_OPTIONS, i]):
+                        any_option |= chains.lanes[pattern + work[OPTIONS + d, at] * n_codes * n_words + w]
+                    table[this + w] = table[this + size + w] + any_option
     add_tables(table, 0, 2 * size, size, size)
     return table_value(pair, size, scratch)
+
+
+@compiled
+def find_components(pair: Pair, n_free: int, scratch: Scratch) -> int:
+    """Number the parts of the open rows that have no options in common, and mark the complete ones."""
+    work = scratch.work
+    for j in range(pair.k):
+        work[CLASS_COMPONENT, j] = -1
+    n_components = 0
+    for d in range(n_free):
+        n = work[N_OPTIONS, work[FREE, d]]
+        component = n_components
+        for at in range(n):
+            other = work[CLASS_COMPONENT, work[OPTIONS + d, at]]
+            if other >= 0 and other != component:
+                if component == n_components:
+                    component = other
+                else:
+                    for j in range(pair.k):
+                        if work[CLASS_COMPONENT, j] == other:
+                            work[CLASS_COMPONENT, j] = component
+                    for e in range(d):
+                        if work[COMPONENT, e] == other:
+                            work[COMPONENT, e] = component
+        n_components += component == n_components
+        work[COMPONENT, d] = component
+        for at in range(n):
+            work[CLASS_COMPONENT, work[OPTIONS + d, at]] = component
+    for component in range(n_components):
+        n_classes = 0
+        for j in range(pair.k):
+            n_classes += work[CLASS_COMPONENT, j] == component
+        work[COMPLETE, component] = True
+        for d in range(n_free):
+            if work[COMPONENT, d] == component and work[N_OPTIONS, work[FREE, d]] != n_classes:
+                work[COMPLETE, component] = False
+    return n_components
 
 
 @compiled
@@ -418,21 +490,19 @@ def improve_by_turns(
             class_of_place[at] = j
             at += 1
     gain = np.zeros((n_free, len(class_of_place)), np.int64)
+    aligned = np.empty(u, np.uint8)
     best = -1
     for _ in range(20):
-        for d in range(n_free):
-            row_a = pair.code_a + scratch.work[FREE, d] * u
-            for p in range(places):
-                j = class_of_place[p]
-                if p > 0 and j == class_of_place[p - 1]:
-                    gain[d, p] = gain[d, p - 1]
-                    continue
-                equal = 0
-                if candidate[scratch.work[FREE, d] * k + j]:
-                    for a in range(u):
-                        if partner[a] >= 0:
-                            equal += chains.codes[row_a + a] == chains.codes[pair.code_b + j * v + partner[a]]
-                gain[d, p] = equal
+        for p in range(places):
+            j = class_of_place[p]
+            if p > 0 and j == class_of_place[p - 1]:
+                gain[:, p] = gain[:, p - 1]
+                continue
+            for a in range(u):
+                aligned[a] = chains.codes[pair.code_b + j * v + partner[a]] if partner[a] >= 0 else NOTHING
+            for d in range(n_free):
+                i = scratch.work[FREE, d]
+                gain[d, p] = equal_entries(chains.codes[pair.code_a + i * u :], aligned) if candidate[i * k + j] else 0
         place = largest_assignment(gain)
         for w in range(size):
             scratch.table[trial_table + w] = scratch.table[w]
@@ -449,6 +519,15 @@ def improve_by_turns(
             scratch.work[TRIAL, d] = j if j >= 0 and candidate[scratch.work[FREE, d] * k + j] else -1
         partner = ordered_columns(scratch.counts, LANES * trial_table, u, v, LANES * n_words)
     return best
+
+
+@compiled
+def equal_entries(x: Codes, y: Codes) -> int:
+    """Number of places up to the end of y in which x and y are equal."""
+    equal = 0
+    for a in range(len(y)):
+        equal += x[a] == y[a]
+    return equal
 
 
 @compiled

@@ -50,7 +50,7 @@ def compare_with_later(
     for kind in range(len(kind_table)):
         for p in range(m):
             of_kind[kind * m + p] = kind_table[kinds[row_starts[i] + p], kind]
-    scratch = room_to_work(m, most_rows, u, most_columns)
+    scratch = room_to_work(m, most_rows, u, most_columns, n_codes)
     chains = Chains(codes, lanes, first)
     n_exact = 0
     for j in range(i, n_chains):

@@ -29,7 +29,7 @@ TemporalInput = Literal["original", "derived"]
 Direction = Literal["mean", "smaller", "larger", "directed"]
 Measure = Literal["temporal", "spatial"]
 
-EFFORT = 100_000
+EFFORT = 50_000
 """Pairs of columns that the search for the best permutation looks at before it gives up the proof."""
 
 # Tables of similarities between kinds of rows above this size are not built, so memory stays bounded (3000² × 8 bytes).
@@ -138,7 +138,8 @@ def compare(
     -----
     Readings of the text that reproduce all its numbers: a row counts in Eq. 2.4 if *any* of its maxima is also the
     maximum of its column; u in Eq. 2.9 is the smaller number of columns; the maxima of Eq. 2.9 are taken over ordered
-    one-to-one alignments (LCS). Rows that never change drop out of the temporal step too (Table 2.2).
+    one-to-one alignments (LCS). Rows that never change drop out of the temporal step too (Table 2.2), and rows without
+    any similarity (0 %) never correspond, whatever the tolerance.
     """
     _check_options(normalizer, tolerance_percent, temporal_input, effort)
     packed = PackedChains([a, b], ["first chain", "second chain"], derived=temporal_input == "derived")
@@ -153,7 +154,9 @@ def compare(
     assigned = np.empty(m, np.int64)
     pair = Pair(0, packed.code_starts[1], packed.lane_starts[1], 0, packed.row_starts[1], m, k, u, v, packed.n_codes)
     chains = Chains(packed.codes, packed.lanes, packed.first)
-    total, exact = best_permutation(chains, pair, candidates, effort, assigned, room_to_work(m, k, u, v))
+    total, exact = best_permutation(
+        chains, pair, candidates, effort, assigned, room_to_work(m, k, u, v, packed.n_codes)
+    )
     partners = _spread_over_identical_rows(assigned, packed.first[m:])
     matched = np.flatnonzero(partners >= 0)
     equal = packed.equal_entries(np.column_stack([matched, partners[matched]]))
@@ -282,7 +285,8 @@ def similarity_table(
     -------
     pandas.DataFrame
         (n, n) float64; ``attrs`` says the direction, the measure and, for the temporal one, the share of pairs that
-        are proven optima (``exact_percent``).
+        are proven optima (``exact_percent``). One search serves both directions of a pair: with proof both are what
+        :func:`compare` finds, without proof the direction from the earlier to the later chain is.
 
     Raises
     ------
