@@ -8,7 +8,7 @@ NBVAL := --nbval --nbval-current-env --nbval-cell-timeout=300
 LAB := --LabApp.default_url=/lab/tree/notebooks --LabApp.news_url=None --LabApp.extension_manager=readonly \
        --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate
 # Tests of every kind; folders that are not there are left out.
-TESTS := $(wildcard tests/unit tests/integration tests/notebooks tests/benchmarks sec_lab notebooks)
+TESTS := $(wildcard README.md tests/unit tests/integration tests/notebooks tests/benchmarks sec_lab notebooks)
 
 # Kernels come from .venv, whatever else is installed for the user; figures from the notebooks' own backend.
 export JUPYTER_PREFER_ENV_PATH := 1
@@ -30,7 +30,7 @@ lab: setup  ## open the notebooks in JupyterLab
 	@$(BIN)/jupyter lab $(LAB) $(if $(filter 0,$(shell id -u)),--allow-root)
 
 test: setup lint types layers  ## run everything that CI runs
-	@$(PYTEST) --doctest-modules --benchmark-disable $(NBVAL) $(TESTS)
+	@$(PYTEST) --doctest-modules --doctest-glob=README.md --benchmark-disable $(NBVAL) $(TESTS)
 
 check: setup lint types layers  ## run the quick part of it, for every commit
 	@$(PYTEST) -q -m "not slow" $(wildcard tests/unit)

@@ -1,7 +1,7 @@
 """Drawn label movies: the artificial *Moving Object* action (Fig. 2.5, 2.6) and the picture of A.1 (Fig. A.1).
 
-``python -m sec_lab.worlds.drawn FOLDER`` writes of both samples the labels, as ``sample_1.npz`` and ``sample_2.npz``, and
-what is observed in them, as ``sample_1.graphml`` and ``sample_2.graphml``.
+``python -m sec_lab.worlds.drawn FOLDER`` writes the labels of both samples (``sample_1.npz``, ``sample_2.npz``) and
+what is observed in them (``sample_1.graphml``, ``sample_2.graphml``).
 """
 
 import io
@@ -15,9 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sec_lab import graphml
 from sec_lab.codes import as_array
 from sec_lab.files import write_whole
+from sec_lab.graphml import write
 from sec_lab.pipeline import observe_segments
 
 SEED = 2012
@@ -221,7 +221,7 @@ def _write_samples(folder: Path) -> None:
         np.savez_compressed(buffer, labels=movie.labels)
         write_whole(folder / f"sample_{sample}.npz", buffer.getvalue())
         seen = observe_segments(movie.labels, relations="edge counting", names=movie.names)
-        graphml.write(folder / f"sample_{sample}.graphml", seen)
+        write(folder / f"sample_{sample}.graphml", seen)
 
 
 if __name__ == "__main__":

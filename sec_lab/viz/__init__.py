@@ -1,0 +1,17 @@
+"""Figures of everything in the workbench; no other room needs them.
+
+Functions draw into axes that are given, or make a figure of their own, without pyplot; what they return shows itself in
+a notebook. One style (:mod:`sec_lab.viz.style`) serves all of them.
+"""
+
+from sec_lab.viz.cells import relation_name as relation_name
+from sec_lab.viz.chain import chain_forms as chain_forms
+from sec_lab.viz.chain import draw_chain as draw_chain
+from sec_lab.viz.curves import draw_curves as draw_curves
+from sec_lab.viz.match import draw_match as draw_match
+from sec_lab.viz.scene import draw_segments as draw_segments
+from sec_lab.viz.strip import draw_main_graphs as draw_main_graphs
+from sec_lab.viz.style import new_figure as new_figure
+from sec_lab.viz.table import draw_similarity_table as draw_similarity_table
+from sec_lab.viz.verdicts import Finding as Finding
+from sec_lab.viz.verdicts import verdict_table as verdict_table
