@@ -176,7 +176,7 @@ def unsupervised_classes(
         Where k-means gets its random starts; ``numpy.random.default_rng(0)`` if left out, so the same table always has
         the same classes.
     k_max : int, optional
-        Greatest number of classes; no limit if left out.
+        Greatest number of classes; n / 2 if left out.
 
     Returns
     -------
@@ -192,6 +192,7 @@ def unsupervised_classes(
     -----
     The n features are not independent of each other: with four classes they hardly leave a space of three dimensions.
     The criterion of X-means takes every feature for evidence of its own and would find more than twice as many classes.
+    Classes are told apart by contrast: a table of a single type has none, and its noise is not always left whole.
 
     Examples
     --------

@@ -126,7 +126,7 @@ def x_means(
         Where the k-means runs get their random starts. The result depends on nothing else: neither on the number of
         threads nor on earlier calls.
     k_min, k_max : int, optional
-        Least and greatest number of clusters; ``k_max=None`` sets no limit.
+        Least and greatest number of clusters; ``k_max=None`` allows n / 2, two points a cluster.
     n_dimensions : int, optional
         M of the criterion that chooses among the divisions, see :func:`bic`. Whether a cluster wants to be split is
         always judged with the number of features.
@@ -145,7 +145,8 @@ def x_means(
     -----
     A cluster of two points is never split, as nothing is left to estimate a variance from; a cluster of identical
     points neither, as there is nothing to gain. If both halves of a cluster consist of identical points, it is better
-    as two however close they are (σ² = 0, see :func:`bic`).
+    as two however close they are (σ² = 0, see :func:`bic`). Among very few points (less than about twenty) chance
+    arranges what looks like clusters to the criterion.
 
     Examples
     --------
@@ -349,7 +350,7 @@ def _check_limits(k_min: int, k_max: int | None, points: NDArray[np.float64]) ->
             raise ValueError(f"k_min: expected at most {different}, the number of different points, got {k_min}")
     if k_max is not None and k_max < k_min:
         raise ValueError(f"k_max: expected at least k_min = {k_min}, got {k_max}")
-    return len(points) if k_max is None else min(k_max, len(points))
+    return max(k_min, len(points) // 2) if k_max is None else min(k_max, len(points))
 
 
 def _check_dimensions(n_dimensions: int | None, points: NDArray[np.float64]) -> int:
