@@ -181,7 +181,8 @@ def unsupervised_classes(
     Returns
     -------
     (n,) int64
-        Class of each manipulation, 0, 1, … in the order in which the classes first appear.
+        Class of each manipulation, 0, 1, … in the order in which the classes first appear. Where all similarities are
+        equal, nothing tells the manipulations apart: one class.
 
     Raises
     ------
@@ -204,6 +205,9 @@ def unsupervised_classes(
     """
     from sec_lab.xmeans import x_means
 
+    values = _as_table(table, at_least=3)
+    if np.ptp(values) == 0:
+        return np.zeros(len(values), np.int64)
     features = correlation_features(table)
     # Departure: the number of classes is chosen with the dimensions that the features fill, not with their number n.
     found = x_means(

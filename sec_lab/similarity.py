@@ -299,8 +299,8 @@ def similarity_table(
     >>> take = EventChain([[0, 2, 2], [2, 2, 0]], [(1, 2), (2, 3)])
     >>> similarity_table({"put": put, "take": take}).round()
             put   take
-    put   100.0   50.0
-    take   50.0  100.0
+    put   100.0   83.0
+    take   83.0  100.0
     """
     import pandas as pd
 

@@ -191,7 +191,7 @@ def x_means(
     return Clustering(best, _means(shifted, best) + points[0], best_bic)
 
 
-class XMeans(ClusterMixin, BaseEstimator):  # type: ignore[misc, unused-ignore]
+class XMeans(ClusterMixin, BaseEstimator):
     """X-means with the interface of scikit-learn; see :func:`x_means`.
 
     Parameters

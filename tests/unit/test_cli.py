@@ -72,6 +72,13 @@ def test_table_prints_and_writes_the_table_and_finds_the_classes(files, capsys):
     assert values[0, 1] < 100
 
 
+def test_chains_that_are_all_alike_are_one_class(files, capsys):
+    for name in ("again", "once_more"):
+        (files / f"{name}.graphml").write_bytes((files / "put.graphml").read_bytes())
+    assert main(["table", *(str(files / f"{name}.graphml") for name in ("put", "again", "once_more"))]) == 0
+    assert "class 1: put, again, once_more" in capsys.readouterr().out
+
+
 def test_files_of_one_name_are_told_apart_by_their_folders(files, capsys):
     for name in ("put", "take", "place"):
         (files / name).mkdir()
