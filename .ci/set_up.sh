@@ -64,6 +64,8 @@ fi
 sources=$(find sec_lab -name '*.py' -print0 | LC_ALL=C sort -z | xargs -0 cat | digest)
 if ! noted warmed-for "$sources"; then
     say "compiling the kernels"
+    # numba does not notice when a function that a compiled one calls has changed in another file.
+    find sec_lab -name '*.nb[ic]' -delete
     "$bin/python" -m sec_lab.warm
     echo "$sources" >.venv/warmed-for
 fi

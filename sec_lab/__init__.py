@@ -1,18 +1,21 @@
 """Semantic event chains: from the movie of a manipulation to a small table, and what follows from it.
 
-The rooms of this package follow the block diagram of Aksoy's dissertation (2012, Fig. 2.2); every public name below
-is imported on first use, so that ``import sec_lab`` costs next to nothing.
+The rooms of this package follow the block diagram of Aksoy's dissertation (2012, Fig. 2.2); nearly every public
+name below is imported on first use, so that ``import sec_lab`` costs little.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+# A room and its function have this one name. Importing the room binds the room to it, once; so the function has to be
+# bound after that, here.
+from sec_lab.event_chain import event_chain as event_chain
 
 if TYPE_CHECKING:
     import sec_lab.graphml as graphml
     from sec_lab.classification import unsupervised_classes as unsupervised_classes
     from sec_lab.codes import Relation as Relation
     from sec_lab.event_chain import EventChain as EventChain
-    from sec_lab.event_chain import event_chain as event_chain
     from sec_lab.observation import Observation as Observation
     from sec_lab.pipeline import observe_segments as observe_segments
     from sec_lab.roles import AmbiguousRoleError as AmbiguousRoleError
@@ -34,14 +37,13 @@ _ROOM_OF = {
     "SceneGraph": "scene_graph",
     "compare": "similarity",
     "corresponding_segments": "roles",
-    "event_chain": "event_chain",
     "main_graphs": "scene_graph",
     "observe_segments": "pipeline",
     "similarity_table": "similarity",
     "unsupervised_classes": "classification",
 }
 _ROOMS = ("graphml",)
-__all__ = ["__version__", *_ROOM_OF, *_ROOMS]
+__all__ = ["__version__", "event_chain", *_ROOM_OF, *_ROOMS]
 
 
 def __getattr__(name: str) -> Any:

@@ -50,7 +50,7 @@ class PackedChains:
         kinds: dict[bytes, int] = {}
         kind_of_row: list[int] = []
         for chain, name in zip(chains, names, strict=True):
-            _check_comparable(chain, name)
+            check_comparable(chain, name)
             rows = _CODE_OF_RELATION[chain.relations[chain.changing_rows]]
             codes.append(N_RELATIONS * rows[:, :-1] + rows[:, 1:] if derived else rows)
             seen: dict[bytes, int] = {}
@@ -89,7 +89,24 @@ class PackedChains:
         return equal
 
 
-def _check_comparable(chain: EventChain, name: str) -> None:
+def check_comparable(chain: EventChain, name: str) -> None:
+    """Refuse a chain that nothing can be compared with.
+
+    Parameters
+    ----------
+    chain : EventChain
+    name : str
+        What it is called in the error message.
+
+    Raises
+    ------
+    TypeError
+        If it is no event chain.
+    ValueError
+        If it has a single column, no change or too many rows that change.
+    """
+    if not isinstance(chain, EventChain):
+        raise TypeError(f"{name}: expected an event chain, got {type(chain).__name__}")
     n_changing = len(chain.changing_rows)
     if chain.relations.shape[1] < 2:
         raise ValueError(f"{name}: expected an event chain of at least two columns, got one")

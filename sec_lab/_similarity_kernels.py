@@ -3,7 +3,8 @@
 import numpy as np
 
 from sec_lab._chain_kernels import Codes, Flags, Integers, Numbers, Words, compiled, mutual_best, row_similarity
-from sec_lab._permutation_kernels import Chains, Pair, best_permutation, room_to_work
+from sec_lab._pair_kernels import Chains, Pair, room_to_work
+from sec_lab._permutation_kernels import best_permutation
 
 
 @compiled

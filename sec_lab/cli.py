@@ -1,11 +1,14 @@
 """The command line: ``sec-lab COMMAND …``."""
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, NoReturn, TextIO
+
+from sec_lab.files import UnusableFileError
 
 if TYPE_CHECKING:
     from sec_lab.event_chain import EventChain
@@ -26,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit code: 0, or 1 if a notebook of the report failed, or 2 for bad input, which is explained in one line.
     """
     options = _parser().parse_args(arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no ≈ shows something else
     try:
         code: int = options.run(options)
         sys.stdout.flush()
@@ -42,8 +47,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that says in one line what is wrong with a call."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} ({self.prog} --help explains)\n")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="sec-lab", description="Semantic event chains: compare, classify and understand manipulations."
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -90,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_command(
-    commands: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, what: str, example: str
+    commands: "argparse._SubParsersAction[_Parser]", name: str, what: str, example: str
 ) -> argparse.ArgumentParser:
     return commands.add_parser(
         name,
@@ -118,12 +130,11 @@ def _add_similarity_options(command: argparse.ArgumentParser) -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from sec_lab.graphml import read_chain
     from sec_lab.similarity import compare
 
     match = compare(
-        read_chain(options.a),
-        read_chain(options.b),
+        _read_comparable(options.a),
+        _read_comparable(options.b),
         normalizer=options.normalizer,
         tolerance_percent=options.tolerance,
     )
@@ -171,11 +182,11 @@ def _row(chain: "EventChain", row: int) -> str:
 def _table(options: argparse.Namespace) -> int:
     from sec_lab.classification import unsupervised_classes
     from sec_lab.files import write_whole
-    from sec_lab.graphml import read_chain
     from sec_lab.similarity import similarity_table
 
+    read = [_read_comparable(path) for path in options.chains]
     names = _short_names(options.chains)
-    chains = {name: read_chain(path) for name, path in zip(names, options.chains, strict=True)}
+    chains = dict(zip(names, read, strict=True))
     table = similarity_table(
         chains,
         direction=options.direction,
@@ -184,18 +195,37 @@ def _table(options: argparse.Namespace) -> int:
         tolerance_percent=options.tolerance,
         progress=sys.stderr.isatty(),
     )
+    try:
+        classes = unsupervised_classes(table)
+        lines = [
+            f"class {number + 1}: {', '.join(n for n, c in zip(names, classes, strict=True) if c == number)}"
+            for number in range(classes.max() + 1)
+        ]
+    except ValueError as error:
+        lines = [f"no classes: {error}"]
     if options.output is not None:
         write_whole(options.output, table.round(6).to_csv())
     _say(table.round(1).to_string())
     if "exact_percent" in table.attrs:
         _say(f"\n{table.attrs['exact_percent']:.1f} % of the pairs are proven optima")
-    if len(names) < 3:
-        _say("classes: at least three chains are needed")
-        return 0
-    classes = unsupervised_classes(table)
-    for number in sorted(set(classes.tolist())):
-        _say(f"class {number + 1}: {', '.join(n for n, c in zip(names, classes, strict=True) if c == number)}")
+    for line in lines:
+        _say(line)
     return 0
+
+
+def _read_comparable(path: Path) -> "EventChain":
+    """The chain in a file, or one line with the path that says why it cannot be compared."""
+    from sec_lab.graphml import read_chain
+    from sec_lab.similarity import check_comparable
+
+    try:
+        chain = read_chain(path)
+    except UnusableFileError:
+        raise
+    except ValueError as error:
+        raise UnusableFileError(f"{path}: {error}") from error
+    check_comparable(chain, str(path))
+    return chain
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -214,7 +244,7 @@ def _short_names(paths: Sequence[Path]) -> list[str]:
     if twice is not None:
         raise ValueError(f"{twice}: expected every chain once, got it twice")
     for depth in range(1, max(len(path.parts) for path in paths) + 1):
-        names = ["/".join(path.with_suffix("").parts[-depth:]) for path in paths]
+        names = ["/".join((*path.parts[:-1], path.stem)[-depth:]) for path in paths]
         if len(set(names)) == len(names):
             break
     else:

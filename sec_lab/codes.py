@@ -128,8 +128,12 @@ def as_relations(values: ArrayLike, *, what: str = "relations", ndim: int | None
     ...
     ValueError: relations: expected codes 0, 1, 2 or 9, got 3
     """
-    integers = as_integers(values, what=what, ndim=ndim)
-    unknown = ((integers < 0) | (integers > 2)) & (integers != 9)
+    array = as_array(values, what=what, ndim=ndim)
+    # Large tables come as bytes already; they need not be widened first.
+    integers = array if array.dtype == np.uint8 else as_integers(array, what=what)
+    unknown = (integers > 2) & (integers != 9)
+    if integers.dtype != np.uint8:
+        unknown |= integers < 0
     if unknown.any():
         raise ValueError(f"{what}: expected codes 0, 1, 2 or 9, got {integers[unknown].flat[0]}")
     return integers.astype(np.uint8)

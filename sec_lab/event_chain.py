@@ -185,6 +185,8 @@ def as_names(names: Names | None) -> Names:
     ...
     ValueError: names: expected text or None, got 3.5
     """
+    if not isinstance(names, Mapping | None):
+        raise ValueError(f"names: expected a mapping of segments to names, got {type(names).__name__}")
     given = dict(names or {})
     labels = as_integers(list(given), what="labels of names", ndim=1)
     for name in given.values():
@@ -198,7 +200,9 @@ def _check_pairs(pairs: NDArray[np.int64]) -> None:
     itself = pairs[:, 0] == pairs[:, 1]
     if itself.any():
         raise ValueError(f"pairs: expected two different segments, got {tuple(pairs[itself][0].tolist())}")
-    unordered = np.sort(pairs, axis=1)
-    unique, count = np.unique(unordered, axis=0, return_counts=True)
+    labels, ranks = np.unique(pairs, return_inverse=True)
+    low, high = np.sort(ranks.reshape(pairs.shape), axis=1).T
+    unordered, count = np.unique(low * len(labels) + high, return_counts=True)
     if (count > 1).any():
-        raise ValueError(f"pairs: expected each pair once, got {tuple(unique[count > 1][0].tolist())} twice")
+        twice = divmod(int(unordered[count > 1][0]), len(labels))
+        raise ValueError(f"pairs: expected each pair once, got {tuple(labels[list(twice)].tolist())} twice")

@@ -4,6 +4,7 @@ import errno
 import os
 import secrets
 from pathlib import Path
+from typing import BinaryIO
 
 
 class UnusableFileError(OSError, ValueError):
@@ -45,7 +46,7 @@ def read_whole(path: str | os.PathLike[str], *, expected: str, max_bytes: int = 
     file = Path(path)
     try:
         with file.open("rb") as stream:
-            content = stream.read(max_bytes + 1)
+            content = _read_up_to(stream, max_bytes + 1)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise UnusableFileError(f"{file}: expected {expected}, but there is no such file") from error
     except IsADirectoryError as error:
@@ -109,3 +110,12 @@ def _replace(file: Path, data: bytes) -> None:
 
 def _reason(error: Exception) -> str:
     return (isinstance(error, OSError) and error.strerror) or str(error)
+
+
+def _read_up_to(stream: BinaryIO, n: int) -> bytes:
+    """Read n bytes or all there are, in pieces: Python sets aside at once whatever it is asked to read."""
+    pieces: list[bytes] = []
+    while n > 0 and (piece := stream.read(min(n, 1 << 20))):
+        pieces.append(piece)
+        n -= len(piece)
+    return b"".join(pieces)

@@ -11,6 +11,7 @@ from sec_lab.event_chain import Names
 from sec_lab.observation import Observation
 from sec_lab.relations import SegmentRelations, edge_count_relations, scan_line_relations
 from sec_lab.scene_graph import SceneGraph, main_graphs, scene_graph
+from sec_lab.segmentation import Segmentation
 
 RelationFunction = Callable[[ArrayLike], SegmentRelations]
 RelationMethod = Literal["scan lines", "edge counting"] | RelationFunction
@@ -22,7 +23,7 @@ _METHODS: dict[str, RelationFunction] = {
 
 
 def observe_segments(
-    label_images: Iterable[ArrayLike],
+    label_images: Iterable[ArrayLike] | Segmentation,
     *,
     relations: RelationMethod = "scan lines",
     names: Names | None = None,
@@ -35,16 +36,19 @@ def observe_segments(
 
     Parameters
     ----------
-    label_images : iterable of (height, width) array_like of int
-        One a frame, all of one size, with labels that stay with their segments.
+    label_images : iterable of (height, width) array_like of int, or Segmentation
+        One a frame, all of one size, with labels that stay with their segments. A segmentation has names and frame
+        numbers of its own. Its background is a segment like any other; ``without_segments(observation,
+        [segmentation.background])`` leaves it out afterwards.
     relations : {"scan lines", "edge counting"} or callable, optional
         How relations are found: :func:`~sec_lab.relations.scan_line_relations` (A.1),
         :func:`~sec_lab.relations.edge_count_relations` (§2.3), or any function from a label image to
         :class:`~sec_lab.relations.SegmentRelations`.
     names : mapping of int to str or None, optional
-        Names of segments.
+        Names of segments; those of the segmentation if left out.
     frames : iterable of int, optional
-        Frame numbers, ascending, at least as many as there are images; 0, 1, 2, … if left out.
+        Frame numbers, ascending, at least as many as there are images; those of the segmentation if left out, or
+        0, 1, 2, …
     progress : bool, optional
         Show a progress bar.
 
@@ -72,12 +76,19 @@ def observe_segments(
         if relations not in _METHODS:
             raise ValueError(f"relations: expected one of {tuple(_METHODS)} or a function, got {relations!r}")
         relations = _METHODS[relations]
+    images: Iterable[ArrayLike] = label_images
+    if isinstance(label_images, Segmentation):
+        names = label_images.names if names is None else names
+        if frames is None:
+            numbered, numbered_again = tee(label_images.numbered())
+            images, frames = (image for _, image in numbered), (number for number, _ in numbered_again)
     if progress:
         from tqdm import tqdm
 
-        label_images = tqdm(label_images, unit="frame")
+        total = label_images.n_frames if isinstance(label_images, Segmentation) else None
+        images = tqdm(images, total=total, unit="frame")
     numbers, numbers_again = tee(count() if frames is None else _ascending(frames))
-    graphs = _scene_graphs(label_images, relations, numbers)
+    graphs = _scene_graphs(images, relations, numbers)
     main = main_graphs(graphs, frames=numbers_again)
     return Observation(main.graphs, main.key_frames, names, "px")
 

@@ -210,7 +210,7 @@ def main_graphs(
     return MainGraphs(kept, key_frames)
 
 
-def same_spectrum(a: SceneGraph, b: SceneGraph, *, eigenvectors: bool = True, tolerance: float = 1e-9) -> bool:
+def same_spectrum(a: SceneGraph, b: SceneGraph, *, eigenvectors: bool = True, tolerance: float = 1e-6) -> bool:
     """Whether the adjacency matrices of two scene graphs have the same eigenvalues, and eigenvectors (§2.4).
 
     Eigenvectors of a repeated eigenvalue are not unique, so the projections onto the eigenspaces are compared.
@@ -240,10 +240,10 @@ def same_spectrum(a: SceneGraph, b: SceneGraph, *, eigenvectors: bool = True, to
     if not eigenvectors:
         return True
     # Eigenvalues of 0/1 matrices that differ do so by far more than this gap at the sizes that occur.
-    starts = np.flatnonzero(np.r_[True, np.diff(values_a) > 1e-6])
+    starts = np.flatnonzero(np.r_[True, np.diff(values_a) > tolerance])
     for first, last in zip(starts, [*starts[1:], len(values_a)], strict=True):
         space_a, space_b = vectors_a[:, first:last], vectors_b[:, first:last]
-        if np.abs(space_a @ space_a.T - space_b @ space_b.T).max() > 1e-6:
+        if np.abs(space_a @ space_a.T - space_b @ space_b.T).max() > tolerance:
             return False
     return True
 

@@ -8,7 +8,7 @@ is chosen whose columns agree best, in their order (Eq. 2.7–2.9).
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from sec_lab import _chain_kernels as kernels
 from sec_lab._packed_chains import PackedChains
-from sec_lab._permutation_kernels import Chains, Pair, best_permutation, room_to_work
+from sec_lab._packed_chains import check_comparable as check_comparable
+from sec_lab._pair_kernels import Chains, Pair, room_to_work
+from sec_lab._permutation_kernels import best_permutation
 from sec_lab._similarity_kernels import compare_with_later
 from sec_lab.event_chain import EventChain
 
@@ -74,10 +76,10 @@ class Match:
     temporal_input: TemporalInput
 
     def __post_init__(self) -> None:
-        for field in ("rows", "columns", "row_similarity", "candidates"):
-            array = np.array(getattr(self, field))
-            array.setflags(write=False)
-            object.__setattr__(self, field, array)
+        _protect(self, "rows", "columns", "row_similarity", "candidates")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     def row_similarity_frame(self) -> "pd.DataFrame":
         """ζ_spatial with the names of its rows and columns, as in Table 2.1."""
@@ -341,6 +343,9 @@ class Permutation:
     rows: NDArray[np.int64]
     temporal: float
 
+    def __post_init__(self) -> None:
+        _protect(self, "rows")
+
 
 def permutations(match: Match, *, limit: int = 10_000) -> list[Permutation]:
     """All permutations that the spatial step leaves, with their temporal similarity (Table 2.2).
@@ -378,6 +383,14 @@ def permutations(match: Match, *, limit: int = 10_000) -> list[Permutation]:
         temporal = 100.0 * total / min(u, v) / len(match.candidates)
         found.append(Permutation(np.array(rows, np.int64).reshape(-1, 2), temporal))
     return found
+
+
+def _protect(record: object, *names: str) -> None:
+    """Replace arrays of a record by copies that cannot be written to."""
+    for name in names:
+        array = np.array(getattr(record, name))
+        array.setflags(write=False)
+        object.__setattr__(record, name, array)
 
 
 def _assignments(candidates: NDArray[np.bool_]) -> Iterator[list[tuple[int, int]]]:

@@ -16,7 +16,7 @@ MissingEdges = Literal["error", "non-touching"]
 UNKNOWN_TYPE = "Unknown"
 """What A.2's dialect writes as the type of a node of which nothing is known."""
 
-MOST_RELATIONS = 1 << 26
+MOST_RELATIONS = 1 << 24
 """Entries of all relation matrices of one file: a small file must not ask for all memory."""
 
 _RELATION_OF = {word: relation for relation, word in WORD_OF.items() if relation != Relation.ABSENT}

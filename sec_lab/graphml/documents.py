@@ -15,7 +15,7 @@ from sec_lab.observation import Observation
 
 Dialect = Literal["thesis", "standard"]
 
-_MOST_CHAIN_ENTRIES = 1 << 27
+_MOST_CHAIN_ENTRIES = 1 << 24
 _XML_BEGINNINGS = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe", b"\xfe\xff", b"<\x00", b"\x00<")
 
 
@@ -76,8 +76,8 @@ def write(path: str | os.PathLike[str], observation: Observation, *, dialect: Di
         Where the file goes; its folder must exist.
     observation : Observation
     dialect : {"thesis", "standard"}, optional
-        The dialect of A.2 (default), or standard GraphML, one graph a key frame, which ``networkx.read_graphml`` and
-        other graph programs open.
+        The dialect of A.2 (default), or standard GraphML, one graph a key frame, which graph programs open. Of several
+        graphs ``networkx.read_graphml`` gives the first; ``networkx.GraphMLReader()(path)`` goes through all of them.
 
     Raises
     ------

@@ -7,7 +7,10 @@ a notebook. One style (:mod:`sec_lab.viz.style`) serves all of them.
 from sec_lab.viz.cells import relation_name as relation_name
 from sec_lab.viz.chain import chain_forms as chain_forms
 from sec_lab.viz.chain import draw_chain as draw_chain
+from sec_lab.viz.counts import draw_counts as draw_counts
 from sec_lab.viz.curves import draw_curves as draw_curves
+from sec_lab.viz.dots import draw_intervals as draw_intervals
+from sec_lab.viz.dots import draw_spread as draw_spread
 from sec_lab.viz.match import draw_match as draw_match
 from sec_lab.viz.scene import draw_segments as draw_segments
 from sec_lab.viz.strip import draw_main_graphs as draw_main_graphs

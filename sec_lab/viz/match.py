@@ -23,6 +23,7 @@ from sec_lab.viz.cells import (
 from sec_lab.viz.style import INK, LINE, PAGE_WIDTH_IN, PAPER, SMALL_PT, SOFT, TEXT_PT, TITLE_PT, axes_at, new_figure
 
 _JOIN_IN, _APART_IN, _ABOVE_IN, _BELOW_IN, _RIGHT_IN = 0.6, 0.35, 0.66, 0.66, 0.12
+_LEAST_TEXT_IN = 1.7
 _TITLE_PAD_PT = 23
 
 
@@ -73,6 +74,8 @@ def draw_match(match: Match, *, row_names: RowNames = "relations", titles: tuple
     figure = new_figure(max(PAGE_WIDTH_IN, fixed_in + 3.0), whole_in)
     free_in = figure.get_figwidth() - fixed_in
     widths_in = np.clip(free_in * shares / shares.sum(), 0.2, 0.55 * shares)
+    # What is written under and over a narrow third table stands out on both its sides.
+    figure.set_figwidth(figure.get_figwidth() + max(0.0, (_LEAST_TEXT_IN - widths_in[2]) / 2))
     axes: list[Axes] = []
     left_in = names_in[0]
     for number, table in enumerate(tables):

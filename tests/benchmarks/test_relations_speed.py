@@ -39,7 +39,7 @@ IMAGES = {
 
 
 @pytest.mark.parametrize("name", IMAGES)
-def test_scan_lines(benchmark: BenchmarkFixture, name: str) -> None:
+def test_scan_lines(benchmark: BenchmarkFixture, capsys: pytest.CaptureFixture[str], name: str) -> None:
     image = IMAGES[name]
     benchmark.group = f"scan lines, {name}"
     scan_lines(image)
@@ -55,7 +55,8 @@ def test_scan_lines(benchmark: BenchmarkFixture, name: str) -> None:
         ratio = min(naive_s) / benchmark.stats.stats.min
         benchmark.extra_info["times faster than plain Python"] = round(ratio)
         milliseconds = 1000 * benchmark.stats.stats.median
-        print(f"\nscan_lines, {name}: {milliseconds:.3f} ms, {ratio:.0f} times faster than plain Python")
+        with capsys.disabled():
+            print(f"\nscan_lines, {name}: {milliseconds:.3f} ms, {ratio:.0f} times faster than plain Python")
 
 
 @pytest.mark.parametrize("relations", [scan_line_relations, edge_count_relations])

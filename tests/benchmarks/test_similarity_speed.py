@@ -13,16 +13,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
 import sec_lab as sl
 from sec_lab.event_chain import EventChain
+from sec_lab.files import write_whole
 from sec_lab.similarity import compare, pairwise_similarity, similarity_table
+from sec_lab.viz import draw_curves
+from sec_lab.viz.style import figure_of, png_bytes
 from tests.naive_similarity import Table, all_permutations_similarity, naive_compare
 
 FOLDER = Path(os.environ.get("SEC_LAB_DATA") or "/nonexistent") / "maniac"
+BUILD = Path(__file__).parents[2] / "build" / "bench"
 TWIN_PERMUTATIONS = 1000
 TWIN_SECONDS = 2.0
 
@@ -175,6 +180,19 @@ def test_cost_against_the_number_of_chains(benchmark: BenchmarkFixture, capsys: 
             for n, s in zip(numbers, spent, strict=True):
                 print(f"{n:6} {s:7.3f} {n_pairs(n) / s:9,.0f}")
             print(f"time grows as N to the power of {exponent:.2f}")
+            print(f"drawn in {draw_cost(numbers, spent)}")
+
+
+def draw_cost(numbers: list[int], seconds: list[float]) -> Path:
+    """Draw seconds against the number of chains, with a line that grows as its square."""
+    quadratic = seconds[-1] * (np.array(numbers) / numbers[-1]) ** 2
+    curves = {"similarity_table": seconds, "N², through the last point": quadratic}
+    frame = pd.DataFrame(curves, index=pd.Index(numbers, name="number of chains N"))
+    axes = draw_curves(frame, y_label="seconds", x_scale="log", y_scale="log", title="All pairs of N 5×6 chains")
+    BUILD.mkdir(parents=True, exist_ok=True)
+    path = BUILD / "cost_against_n.png"
+    write_whole(path, png_bytes(figure_of(axes)))
+    return path.relative_to(BUILD.parents[1])
 
 
 def test_two_steps_against_all_permutations(benchmark: BenchmarkFixture, capsys: pytest.CaptureFixture[str]) -> None:

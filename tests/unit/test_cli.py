@@ -1,6 +1,7 @@
 """The command line as a user meets it: what it prints, what it writes, and what it says of bad input."""
 
 import csv
+import os
 import re
 import subprocess
 import sys
@@ -93,13 +94,17 @@ def test_files_of_one_name_are_told_apart_by_their_folders(files, capsys):
         (["compare", "{}/none.graphml", "{}/put.graphml"], "none.graphml: expected .*there is no such file"),
         (["compare", "{}", "{}/put.graphml"], "this is a directory"),
         (["compare", "{}/cut.graphml", "{}/put.graphml"], "cut.graphml: "),
-        (["compare", "{}/put.graphml", "{}/still.graphml"], "second chain: .*at least two columns, got one"),
+        (
+            ["compare", "{}/put.graphml", "{}/still.graphml"],
+            "still.graphml: expected an event chain of at least two columns, got one",
+        ),
         (
             ["compare", "{}/put.graphml", "{}/take.graphml", "--tolerance", "101"],
             "tolerance_percent: expected 0 to 100",
         ),
         (["table", "{}/put.graphml", "{}/put.graphml"], "put.graphml: expected every chain once"),
         (["table", "{}/put.graphml", "{}/take.graphml", "-o", "{}/no/table.csv"], "there is no folder"),
+        (["table", "{}/put.graphml", "."], r"\.: expected .*this is a directory"),
         (["report", "{}/none.ipynb"], "none.ipynb"),
     ],
 )
@@ -124,11 +129,52 @@ def test_every_command_explains_itself_with_an_example(command, capsys):
     assert f"example:\n  sec-lab {command} " in capsys.readouterr().out
 
 
-def test_unknown_commands_are_refused_with_code_2(capsys):
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "COMMAND"),
+        (["dance"], "dance"),
+        (["compare", "a.graphml"], "B"),
+        (["compare", "a.graphml", "b.graphml", "--tolerance", "much"], "much"),
+        (["table", "a.graphml", "--direction", "up"], "up"),
+    ],
+)
+def test_a_wrong_call_is_one_line_and_exit_code_2(arguments, message, capsys):
     with pytest.raises(SystemExit) as exit_:
-        main(["dance"])
+        main(arguments)
     assert exit_.value.code == 2
-    assert "dance" in capsys.readouterr().err
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+
+
+def test_classes_that_are_not_defined_are_no_failure(tmp_path, capsys):
+    # The one change of the first chain is found in all others: its column is 100 % everywhere.
+    rows = {
+        "short": [[0, 2], [0, 0]],
+        "there": [[0, 2, 2], [0, 0, 2]],
+        "back": [[0, 2, 2], [2, 2, 0]],
+    }
+    for name, table in rows.items():
+        graphs = [
+            SceneGraph([1, 2, 3], [[0, c[0], 0], [c[0], 0, c[-1]], [0, c[-1], 0]]) for c in np.transpose(table).tolist()
+        ]
+        graphml.write(tmp_path / f"{name}.graphml", Observation(graphs, range(len(graphs))))
+    paths = [str(tmp_path / f"{name}.graphml") for name in rows]
+    assert main(["table", *paths, "--direction", "larger", "-o", str(tmp_path / "table.csv")]) == 0
+    assert "no classes: table: expected different values in every column" in capsys.readouterr().out
+    assert (tmp_path / "table.csv").exists()
+
+
+def test_a_terminal_without_the_signs_gets_others(files):
+    code = "import sys; from sec_lab.cli import main; sys.exit(main(sys.argv[1:]))"
+    paths = [str(files / f"{name}.graphml") for name in ("put", "place")]
+    done = subprocess.run(
+        [sys.executable, "-c", code, "compare", *paths],
+        capture_output=True,
+        check=True,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
+    assert b"1 hand  ?  4 hand" in done.stdout
 
 
 def test_a_reader_that_leaves_early_is_no_error(files):
