@@ -64,8 +64,27 @@ def edge_count_relations(
     """Relations of all pairs of segments of a label image by counting edges (§2.3).
 
     Segments are adjacent if their normalized touching hints exceed the threshold; which edges mean touching and which
-    overlapping, see :func:`edge_counting`. Parameters and errors are those of
-    :func:`~sec_lab.relations.relations_from_counts`.
+    overlapping, see :func:`edge_counting`.
+
+    Parameters
+    ----------
+    labels : (height, width) array_like of int
+        Segment label of every pixel, 0 or greater; every label is a segment, 0 too.
+    normalization : {"scan lines", "pixel area"}, optional
+        See :func:`~sec_lab.relations.normalized_counts`.
+    touching_threshold : float, optional
+        What the normalized touching hints of adjacent segments must exceed;
+        :data:`~sec_lab.relations.TOUCHING_THRESHOLD` of the normalization if left out.
+
+    Returns
+    -------
+    SegmentRelations
+        Positions are the segments' centres (column, row) in pixels.
+
+    Raises
+    ------
+    ValueError
+        As in :func:`~sec_lab.relations.scan_line_relations`.
 
     Examples
     --------

@@ -134,7 +134,28 @@ def scan_line_relations(
 ) -> SegmentRelations:
     """Relations of all pairs of segments of a label image by the scan-line method (A.1).
 
-    The same as :func:`scan_lines` followed by :func:`relations_from_counts`, where parameters and errors are described.
+    The same as :func:`scan_lines` followed by :func:`relations_from_counts`.
+
+    Parameters
+    ----------
+    labels : (height, width) array_like of int
+        Segment label of every pixel, 0 or greater; every label is a segment, 0 too.
+    normalization : {"scan lines", "pixel area"}, optional
+        See :func:`normalized_counts`.
+    touching_threshold, overlapping_threshold : float, optional
+        See :func:`relations_from_counts`.
+
+    Returns
+    -------
+    SegmentRelations
+        Positions are the segments' centres (column, row) in pixels.
+
+    Raises
+    ------
+    ValueError
+        If the image is empty or not two-dimensional, a label is negative or not whole, there are more than
+        :data:`~sec_lab.relations.MAX_SEGMENTS` segments, the normalization is unknown, or a threshold is negative or
+        not finite.
 
     Examples
     --------

@@ -136,6 +136,20 @@ def test_set_up_does_only_what_a_change_asks_for(checkout: Path) -> None:
     assert set_up(checkout) == ["-m venv", PACKAGES, PACKAGES, WARM]
 
 
+def test_set_up_empties_the_cache_of_kernels_when_a_source_changes(checkout: Path) -> None:
+    set_up(checkout)
+    cache = checkout / "sec_lab" / "room" / "__pycache__"
+    cache.mkdir(parents=True)
+    compiled = [cache / "kernels.loop-1.py311.nbi", cache / "kernels.loop-1.py311.1.nbc"]
+    for file in compiled:
+        file.touch()
+    assert set_up(checkout) == []
+    assert all(file.exists() for file in compiled)
+    (checkout / "sec_lab" / "__init__.py").write_text("'''Changed.'''\n")
+    assert set_up(checkout) == [WARM]
+    assert not any(file.exists() for file in compiled)
+
+
 def test_set_up_goes_on_where_it_was_interrupted(checkout: Path) -> None:
     set_up(checkout)
     for note in ("built-in", "built-from", "installed-for", "warmed-for"):

@@ -30,10 +30,20 @@ def test_records_need_nothing_heavy(name: str) -> None:
 
 @pytest.mark.parametrize("name", sec_lab.__all__)
 def test_every_public_name_is_there(name: str) -> None:
-    assert getattr(sec_lab, name) is getattr(sec_lab, name)
+    kind = type(getattr(sec_lab, name)).__name__
+    assert kind == "module" if name in sec_lab._ROOMS else kind != "module"
     assert name in dir(sec_lab)
 
 
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(AttributeError, match=r"^module 'sec_lab' has no attribute 'no_such_name'$"):
         _ = sec_lab.no_such_name
+
+
+@pytest.mark.parametrize("name", ["EventChain", "compare", "graphml", "observe_segments"])
+def test_event_chain_is_the_function_whatever_was_used_before(name: str) -> None:
+    # The room has the same name; importing it must not put the room in the place of the function.
+    code = f"import sec_lab as s; s.{name}; import sec_lab.event_chain; print(type(s.event_chain).__name__)"
+    assert (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "function\n"
+    )
