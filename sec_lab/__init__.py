@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from sec_lab.event_chain import EventChain as EventChain
     from sec_lab.observation import Observation as Observation
     from sec_lab.pipeline import observe_segments as observe_segments
+    from sec_lab.recording import Recording as Recording
     from sec_lab.roles import AmbiguousRoleError as AmbiguousRoleError
     from sec_lab.roles import corresponding_segments as corresponding_segments
     from sec_lab.scene_graph import SceneGraph as SceneGraph
     from sec_lab.scene_graph import main_graphs as main_graphs
+    from sec_lab.segmentation import Segmentation as Segmentation
     from sec_lab.similarity import Match as Match
     from sec_lab.similarity import compare as compare
     from sec_lab.similarity import similarity_table as similarity_table
@@ -33,8 +35,10 @@ _ROOM_OF = {
     "EventChain": "event_chain",
     "Match": "similarity",
     "Observation": "observation",
+    "Recording": "recording",
     "Relation": "codes",
     "SceneGraph": "scene_graph",
+    "Segmentation": "segmentation",
     "compare": "similarity",
     "corresponding_segments": "roles",
     "main_graphs": "scene_graph",
