@@ -7,15 +7,11 @@ prefers the two, it wants to be split (Improve-Structure). Then k-means runs on 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, ClusterMixin
-from sklearn.cluster import KMeans
-from sklearn.metrics import pairwise_distances_argmin
-from sklearn.utils import check_random_state
-from sklearn.utils.validation import check_is_fitted, validate_data
+from scipy.cluster.vq import kmeans2, vq
 from threadpoolctl import threadpool_limits
 
 from sec_lab.codes import as_array, as_integers
@@ -191,66 +187,6 @@ def x_means(
     return Clustering(best, _means(shifted, best) + points[0], best_bic)
 
 
-class XMeans(ClusterMixin, BaseEstimator):
-    """X-means with the interface of scikit-learn; see :func:`x_means`.
-
-    Parameters
-    ----------
-    k_min, k_max, n_dimensions : int, optional
-        As in :func:`x_means`.
-    random_state : int, numpy.random.RandomState or None, optional
-        Where the random starts come from; an int gives the same result every time.
-
-    Attributes
-    ----------
-    labels_ : (n,) int64
-        Cluster of each point of :meth:`fit`, 0, 1, … in the order in which the clusters first appear.
-    cluster_centers_ : (n_clusters_, m) float64
-    n_clusters_ : int
-    bic_ : float
-        Bayesian information criterion, see :func:`bic`.
-    n_features_in_ : int
-
-    Examples
-    --------
-    >>> model = XMeans(random_state=0).fit([[0.0], [0.2], [0.1], [5.0], [5.1], [5.2]])
-    >>> model.n_clusters_, model.labels_, model.predict([[4.0]])
-    (2, array([0, 0, 0, 1, 1, 1]), array([1]))
-    """
-
-    def __init__(
-        self,
-        *,
-        k_min: int = 1,
-        k_max: int | None = None,
-        n_dimensions: int | None = None,
-        random_state: int | np.random.RandomState | None = None,
-    ) -> None:
-        self.k_min = k_min
-        self.k_max = k_max
-        self.n_dimensions = n_dimensions
-        self.random_state = random_state
-
-    def fit(self, X: ArrayLike, y: object = None) -> Self:  # noqa: ARG002 - the interface has it
-        """Find the clusters of the points X, shape (n, m); y is ignored."""
-        points = validate_data(self, X, dtype=np.float64)
-        rng = np.random.default_rng(check_random_state(self.random_state).randint(2**31))
-        found = x_means(points, rng=rng, k_min=self.k_min, k_max=self.k_max, n_dimensions=self.n_dimensions)
-        # Copies, as users of this interface may write into what they get.
-        self.labels_ = found.labels.copy()
-        self.cluster_centers_ = found.centers.copy()
-        self.n_clusters_ = len(found.centers)
-        self.bic_ = found.bic
-        return self
-
-    def predict(self, X: ArrayLike) -> NDArray[np.int64]:
-        """Cluster whose centre is nearest to each of the points X, shape (n, m)."""
-        check_is_fitted(self)
-        points = validate_data(self, X, dtype=np.float64, reset=False)
-        with threadpool_limits(limits=1):
-            return np.asarray(pairwise_distances_argmin(points, self.cluster_centers_), np.int64)
-
-
 class _Split(NamedTuple):
     """What the criterion gains by splitting a cluster, and which points leave it."""
 
@@ -291,14 +227,26 @@ def _split(
 def _k_means(
     points: NDArray[np.float64], start: int | NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Clusters of points by k-means from given centres, or a number of them that start by k-means++."""
-    options: Mapping[str, Any] = (
-        {"n_clusters": start, "init": "k-means++", "n_init": _STARTS}
-        if isinstance(start, int)
-        else {"n_clusters": len(start), "init": start, "n_init": 1}
-    )
-    seed = int(rng.integers(2**32))
-    return _numbered(KMeans(**options, max_iter=_MAX_STEPS, tol=0.0, random_state=seed).fit(points).labels_)
+    """Clusters of points by k-means from given centres, or the best of several k-means++ starts with so many.
+
+    Centres that lose all their points are dropped.
+    """
+    if not isinstance(start, int):
+        return _settle(points, start)
+    starts = (kmeans2(points, start, iter=1, minit="++", missing="raise", rng=rng)[0] for _ in range(_STARTS))
+    found = [_settle(points, centers) for centers in starts]
+    return min(found, key=lambda labels: float(np.square(points - _means(points, labels)[labels]).sum()))
+
+
+def _settle(points: NDArray[np.float64], centers: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Points go to the nearest centre, centres to the mean of their points, until nothing changes."""
+    labels = _numbered(vq(points, centers)[0].astype(np.int64))
+    for _ in range(_MAX_STEPS):
+        before = labels
+        labels = _numbered(vq(points, _means(points, labels))[0].astype(np.int64))
+        if np.array_equal(labels, before):
+            break
+    return labels
 
 
 def _bic(points: NDArray[np.float64], labels: NDArray[np.int64], *, m: int, resolution: float) -> float:

