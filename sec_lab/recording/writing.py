@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from av.container import OutputContainer
     from av.video.stream import VideoStream
 
-# Fixed, as the number of threads leaves traces in what x264 writes: the same frames give the same bytes anywhere.
+# The same frames give the same bytes anywhere, so nothing of the machine may leave traces in what x264 writes: neither
+# its number of threads nor its instructions. With AVX-512, x264's macroblock tree even differs from run to run.
 _THREADS = 4
+_SAME_EVERYWHERE = {"x264-params": "cpu-independent=1"}
 
 
 def write_movie(
@@ -144,7 +146,7 @@ def _opened(
         codec, layout, options = "libx264", "yuv420p" if not (height % 2 or width % 2) else "yuv444p", {"crf": str(crf)}
     try:
         container = av.open(str(file.absolute()), "w")
-        stream = container.add_stream(codec, rate=rate, options=options)
+        stream = container.add_stream(codec, rate=rate, options=options | _SAME_EVERYWHERE)
     except av.error.FFmpegError:
         raise
     except ValueError as error:
