@@ -86,21 +86,12 @@ def again(plan, tmp_path_factory):
     return folder
 
 
-def test_the_same_plan_gives_the_same_truth(movie, again) -> None:
+def test_the_same_plan_gives_the_same_files(movie, again) -> None:
     folder, _ = movie
     names = sorted(path.name for path in folder.iterdir())
     assert names == ["calibration.json", "left.mp4", "names.json", "right.mp4", "truth.npz"]
-    for name in ("calibration.json", "names.json", "truth.npz"):
+    for name in names:
         assert (folder / name).read_bytes() == (again / name).read_bytes(), name
-
-
-@pytest.mark.xfail(
-    strict=False, reason="equal pictures are now and then encoded to other bytes; the cause is not known yet"
-)
-@pytest.mark.parametrize("name", ["left.mp4", "right.mp4"])
-def test_the_same_plan_gives_the_same_movie(movie, again, name) -> None:
-    folder, _ = movie
-    assert (folder / name).read_bytes() == (again / name).read_bytes()
 
 
 def test_calibration_is_read_back(movie) -> None:
@@ -152,7 +143,7 @@ def test_truth_refuses_arrays_that_do_not_fit() -> None:
         Truth(np.zeros((2, 3, 4)), np.zeros((2, 3, 4)), [(1, 2)], [[True]], {})
 
 
-@pytest.mark.parametrize("wrong", [["--seed", "-1"], ["--size", "17", "16"], ["--action", "juggling"]])
+@pytest.mark.parametrize("wrong", [["--seed", "-1"], ["--size", "17", "16"], ["--action", "juggling"], ["--jobs", "0"]])
 def test_bad_input_ends_with_code_2_and_one_line(wrong, tmp_path, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
         main([str(tmp_path / "movies"), *wrong])
@@ -161,21 +152,10 @@ def test_bad_input_ends_with_code_2_and_one_line(wrong, tmp_path, capsys) -> Non
 
 
 @pytest.mark.slow
-def test_the_command_line_makes_a_movie(tmp_path) -> None:
-    wanted = [
-        "--action",
-        "moving_object",
-        "--version",
-        "2",
-        "--setting",
-        "kitchen",
-        "--seed",
-        "3",
-        "--size",
-        "64",
-        "48",
-    ]
-    assert main([str(tmp_path), *wanted]) == 0
-    truth = read_truth(tmp_path / "moving_object_2_kitchen")
-    assert {"hand", "fruit", "plate"} <= set(truth.names.values())
-    assert truth.labels.shape[1:] == (48, 64)
+def test_the_command_line_makes_movies_side_by_side(tmp_path) -> None:
+    wanted = ["--action", "moving_object", "--version", "2", "--seed", "3", "--size", "64", "48"]
+    assert main([str(tmp_path), *wanted, "--jobs", "2"]) == 0
+    for name in ("moving_object_2_kitchen", "moving_object_2_laboratory"):
+        truth = read_truth(tmp_path / name)
+        assert {"hand", "fruit", "plate"} <= set(truth.names.values())
+        assert truth.labels.shape[1:] == (48, 64)

@@ -1,12 +1,13 @@
 """Command line: ``python -m sec_lab.worlds.tabletop FOLDER``."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sec_lab.worlds.tabletop.actions import ACTIONS, VERSIONS, plan_movie
-from sec_lab.worlds.tabletop.make import make_movie
+from sec_lab.worlds.tabletop.actions import ACTIONS, VERSIONS
+from sec_lab.worlds.tabletop.make import make_movie_of
 from sec_lab.worlds.tabletop.settings import SETTINGS
 
 SEED = 2011
@@ -37,26 +38,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--setting", choices=SETTINGS, action="append", help="likewise")
     parser.add_argument("--seed", type=int, default=SEED, help=f"of everything that is random (default {SEED})")
     parser.add_argument("--size", type=int, nargs=2, default=(320, 256), metavar=("WIDTH", "HEIGHT"), help="in pixels")
+    parser.add_argument("--jobs", type=int, default=1, help="how many movies are made at a time (default 1)")
     given = parser.parse_args(arguments)
     if min(given.size) < 16 or any(side % 2 for side in given.size):
         parser.error(f"argument --size: expected even numbers of at least 16, got {given.size[0]} {given.size[1]}")
+    if given.jobs < 1:
+        parser.error(f"argument --jobs: expected a number of at least 1, got {given.jobs}")
+    wanted = [
+        (action, version, setting)
+        for action in given.action or ACTIONS
+        for version in given.version or VERSIONS
+        for setting in given.setting or SETTINGS
+    ]
     try:
         given.folder.mkdir(parents=True, exist_ok=True)
-        for action in given.action or ACTIONS:
-            for version in given.version or VERSIONS:
-                for setting in given.setting or SETTINGS:
-                    _make(given.folder, action, version, setting, given.seed, tuple(given.size))
+        _make(given.folder, wanted, seed=given.seed, size_px=tuple(given.size), jobs=given.jobs)
     except (ValueError, OSError) as problem:
         parser.exit(2, f"error: {problem}\n")
     return 0
 
 
-def _make(folder: Path, action: str, version: int, setting: str, seed: int, size: tuple[int, int]) -> None:
+def _make(
+    folder: Path, wanted: Sequence[tuple[str, int, str]], *, seed: int, size_px: tuple[int, int], jobs: int
+) -> None:
+    from joblib import Parallel, delayed
     from tqdm import tqdm
 
-    plan = plan_movie(action, version, setting, seed=seed, size_px=size)  # type: ignore[arg-type]
-    with tqdm(total=2 * plan.n_frames, desc=plan.name, unit="picture", disable=not sys.stderr.isatty()) as bar:
-        make_movie(folder / plan.name, plan, on_frame=bar.update)
+    if jobs > 1:
+        # The software renderer's own threads help less than movies side by side.
+        os.environ.setdefault("LP_NUM_THREADS", "1")
+    made = Parallel(n_jobs=min(jobs, len(wanted)), return_as="generator_unordered")(
+        delayed(make_movie_of)(folder, *which, seed=seed, size_px=size_px) for which in wanted
+    )
+    for _ in tqdm(made, total=len(wanted), unit="movie", disable=not sys.stderr.isatty()):
+        pass
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """From a plan to files: two movies, the truth, the calibration."""
 
 import json
-from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -10,10 +9,12 @@ from numpy.typing import NDArray
 
 from sec_lab.files import write_whole
 from sec_lab.recording import write_movie
+from sec_lab.worlds.tabletop.actions import Action, plan_movie
 from sec_lab.worlds.tabletop.camera import calibration, exposed
 from sec_lab.worlds.tabletop.contacts import contacts
 from sec_lab.worlds.tabletop.plan import Plan, segment_names
-from sec_lab.worlds.tabletop.scene import Stage, stage
+from sec_lab.worlds.tabletop.scene import stage
+from sec_lab.worlds.tabletop.settings import Setting
 from sec_lab.worlds.tabletop.truth import Truth, write_truth
 
 FRAMES_PER_SECOND = 25
@@ -23,7 +24,7 @@ CRF = 17
 EYES = ("left", "right")
 
 
-def make_movie(folder: Path, plan: Plan, *, crf: float = CRF, on_frame: Callable[[], object] = lambda: None) -> Truth:
+def make_movie(folder: Path, plan: Plan, *, crf: float = CRF) -> Truth:
     """Render a plan and write ``left.mp4``, ``right.mp4``, ``truth.npz``, ``names.json`` and ``calibration.json``.
 
     Parameters
@@ -33,8 +34,6 @@ def make_movie(folder: Path, plan: Plan, *, crf: float = CRF, on_frame: Callable
     plan : Plan
     crf : float, optional
         Constant rate factor of the compression.
-    on_frame : callable, optional
-        Called after each of the ``2 * plan.n_frames`` pictures.
 
     Returns
     -------
@@ -49,8 +48,16 @@ def make_movie(folder: Path, plan: Plan, *, crf: float = CRF, on_frame: Callable
     pairs, touching = contacts(plan)
     labels: list[NDArray[np.uint8]] = []
     depth: list[NDArray[np.uint16]] = []
+    movies: tuple[list[NDArray[np.uint8]], ...] = tuple([] for _ in EYES)
+    noise = [np.random.default_rng([plan.seed, eye]) for eye in range(len(EYES))]
     with stage(plan) as scene:
-        movies = [list(_pictures(scene, eye, on_frame, labels=labels, depth=depth)) for eye in range(len(EYES))]
+        for frame in range(plan.n_frames):
+            scene.pose(frame)
+            # Both eyes at one pose share what is most of the work, the shadows.
+            for eye, pictures in enumerate(movies):
+                pictures.append(exposed(scene.colour(eye), plan.sensor, noise[eye]))
+            labels.append(scene.labels())
+            depth.append(np.round(1000 * scene.depth()).astype(np.uint16))
     for name, pictures in zip(EYES, movies, strict=True):
         write_movie(folder / f"{name}.mp4", pictures, frames_per_second=FRAMES_PER_SECOND, crf=crf)
     truth = Truth(np.stack(labels), np.stack(depth), pairs, touching, segment_names(plan))
@@ -59,21 +66,23 @@ def make_movie(folder: Path, plan: Plan, *, crf: float = CRF, on_frame: Callable
     return truth
 
 
-def _pictures(
-    scene: Stage,
-    eye: int,
-    on_frame: Callable[[], object],
-    *,
-    labels: list[NDArray[np.uint8]],
-    depth: list[NDArray[np.uint16]],
-) -> Iterator[NDArray[np.uint8]]:
-    """Pictures of one eye; those of the left one add their labels and depth to the lists."""
-    rng = np.random.default_rng([scene.plan.seed, eye])
-    for frame in range(scene.plan.n_frames):
-        scene.pose(frame)
-        if eye == 0:
-            labels.append(scene.labels())
-            depth.append(np.round(1000 * scene.depth()).astype(np.uint16))
-        picture = exposed(scene.colour(eye), scene.plan.sensor, rng)
-        on_frame()
-        yield picture
+def make_movie_of(
+    folder: Path, action: Action, version: int, setting: Setting, *, seed: int, size_px: tuple[int, int] = (320, 256)
+) -> Path:
+    """Plan and render one movie into a folder of its own; see :func:`plan_movie` and :func:`make_movie`.
+
+    Returns
+    -------
+    Path
+        Of its folder, inside the one that is given.
+
+    Raises
+    ------
+    ValueError
+        If the action, version, setting or seed is unknown.
+    UnusableFileError
+        If a file cannot be written.
+    """
+    plan = plan_movie(action, version, setting, seed=seed, size_px=size_px)
+    make_movie(folder / plan.name, plan)
+    return folder / plan.name
