@@ -8,6 +8,7 @@ import pytest
 from sec_lab.worlds.tabletop.actions import ACTIONS, VERSIONS, plan_movie
 from sec_lab.worlds.tabletop.camera import project
 from sec_lab.worlds.tabletop.contacts import contacts, surface_points
+from sec_lab.worlds.tabletop.objects import liquid_in
 from sec_lab.worlds.tabletop.plan import Actor, Plan, carried, eased, pose, segment_names, still
 from sec_lab.worlds.tabletop.reach import Timeline
 from sec_lab.worlds.tabletop.shapes import rounded_box
@@ -73,15 +74,38 @@ def test_a_cup_is_filled_from_another() -> None:
     seen = _changes("filling_liquid")
     _, (lifted, put) = seen["table", "full cup"]
     _, (gripped, released) = seen["hand", "full cup"]
-    _, (flows, stops) = seen["full cup", "liquid"]
-    _, (arrives,) = seen["empty cup", "liquid"]
-    assert gripped <= lifted < flows <= arrives < stops < put <= released
+    before, (stops,) = seen["full cup", "liquid"]
+    assert before
+    before, (arrives,) = seen["empty cup", "liquid"]
+    assert not before
+    assert gripped <= lifted < arrives < stops < put <= released
     assert ("full cup", "empty cup") not in seen
+    assert ("hand", "liquid") not in seen
     assert ("table", "liquid") not in seen
-    surface = _plan("filling_liquid").actors[4]
+    jet, surface, remaining = (actor for actor in _plan("filling_liquid").actors if actor.name == "liquid")
     level = surface.X_WB[surface.form >= 0, 2, 3]
     assert (np.diff(level) >= 0).all()
     assert level[-1] > level[0] + 0.02
+    # What is left in the full cup only sinks, and is gone when no more falls.
+    lowest = [remaining.forms[form].vertices_m[:, 2].min() for form in remaining.form if form >= 0]
+    assert (np.diff(lowest) < 1e-9).all()
+    assert lowest[0] > lowest[-1] + 0.05
+    assert len(lowest) == np.flatnonzero(jet.form == 5)[0] == stops
+
+
+def test_the_surface_in_a_tilted_cup_is_flat_and_inside() -> None:
+    rng = np.random.default_rng(0)
+    for tilt in (0.0, 0.3, 0.8, 1.3):
+        surface = liquid_in((0.04, 0.1), 0.08, tilt, (200, 100, 50), rng, towards=np.pi / 2)
+        x, y, z = surface.vertices_m.T
+        slope = np.tan(tilt)
+        assert z == pytest.approx(z[0] + slope * (y - y[0]), abs=1e-9)
+        assert z.min() > 0.004
+        assert z.max() < 0.0985
+        assert np.hypot(x, y).max() < 0.04
+        assert np.hypot(x, y)[1:].max() > 0.033
+    # Level with a rim 2 cm above it, 0.4 radians are the last at which nothing is lost.
+    assert liquid_in((0.04, 0.1), 0.08, 0.4, (200, 100, 50), rng).vertices_m[0, 2] == pytest.approx(0.08, abs=0.001)
 
 
 @pytest.mark.slow

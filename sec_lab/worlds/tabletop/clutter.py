@@ -11,7 +11,7 @@ from sec_lab.worlds.tabletop.shapes import Floats, Shape
 from sec_lab.worlds.tabletop.textures import Colour
 
 _COUNTS: dict[Setting, tuple[int, ...]] = {"laboratory": (0, 1, 1, 2), "kitchen": (2, 3, 2, 3)}
-_CLEAR_M = 0.105
+_CLEAR_M, _GAP_M = 0.105, 0.005
 _LABORATORY: tuple[Colour, ...] = ((232, 206, 60), (60, 110, 200), (200, 60, 110), (240, 240, 240), (40, 40, 46))
 _KITCHEN: tuple[Colour, ...] = ((190, 150, 116), (214, 186, 152), (150, 108, 80), (226, 206, 178), (120, 110, 100))
 
@@ -33,7 +33,7 @@ def clutter(
     Returns
     -------
     list of Actor
-        Fewer than planned if there is no room.
+        Fewer than planned where there is no room, or a thing would touch something.
     """
     colours = _LABORATORY if setting == "laboratory" else _KITCHEN
     taken = np.concatenate([act.path_m[:, :2], *(place[:, :2] for place in act.places_m)])
@@ -48,8 +48,24 @@ def clutter(
         kind = str(kinds[number % 4])
         colour, second = colours[order[number]], colours[order[(number + 2) % len(colours)]]
         turned = pose((*spot, 0.0), yaw=rng.uniform(0, 6))
-        found.append(still(f"{kind} aside", _thing(kind, colour, second, rng), turned, n_frames))
+        thing = still(f"{kind} aside", _thing(kind, colour, second, rng), turned, n_frames)
+        if all(_apart(thing, actor) for actor in (*act.actors, *found) if "hand" not in actor.name):
+            found.append(thing)
     return found
+
+
+def _apart(thing: Actor, actor: Actor) -> bool:
+    """Whether the circles round two bodies, seen from above, never come near each other."""
+    (middle, radius), (other_middle, other_radius) = (_circle(body.forms[0]) for body in (thing, actor))
+    place = (thing.X_WB[0] @ middle)[:2]
+    path = (actor.X_WB @ other_middle)[:, :2]
+    return bool(np.hypot(*(path - place).T).min() > radius + other_radius + _GAP_M)
+
+
+def _circle(shape: Shape) -> tuple[Floats, float]:
+    low, high = shape.vertices_m.min(axis=0), shape.vertices_m.max(axis=0)
+    middle = (low + high) / 2
+    return np.append(middle, 1.0), float(np.linalg.norm((shape.vertices_m - middle)[:, :2], axis=1).max())
 
 
 def _free_spot(taken: Floats, camera: Camera, rng: np.random.Generator) -> Floats | None:

@@ -1,4 +1,8 @@
-"""*Filling Liquid*: a cup is filled with liquid from another cup (§2.3)."""
+"""*Filling Liquid*: a cup is filled with liquid from another cup (§2.3).
+
+All liquid is one segment, wherever it is: at first in the full cup, then falling, at last in the cup that was empty. It
+is of one colour and moves out of one cup into the other, which is what a viewer sees of this action.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,8 +17,11 @@ from sec_lab.worlds.tabletop.shapes import Floats, Shape
 from sec_lab.worlds.tabletop.textures import Colour
 
 Place = tuple[float, float]
-_TAPER = 0.95
-_WALL_M = 0.0035
+_TAPER, _SOURCE_TAPER = 0.95, 0.85
+_WALL_M, _SOURCE_WALL_M = 0.0035, 0.0055
+_FULL = 0.80
+"""Height of the liquid in the full cup, as a share of the cup's."""
+_N_LEVELS = 14
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,8 @@ def act(version: int, setting: Setting, skin: Colour, rng: np.random.Generator) 
     v = _VERSIONS[version - 1]
     colours = (_LABORATORY if setting == "laboratory" else _KITCHEN)[version - 1]
     source_at, target_at, end_at = (varied(place, rng) for place in (v.source_at, v.target_at, v.end_at))
-    source = objects.cup(*v.source_m, colours[0], colours[1], rng, handle=False, wall_m=_WALL_M)
+    full = {"taper": _SOURCE_TAPER, "wall_m": _SOURCE_WALL_M}
+    source = objects.cup(*v.source_m, colours[0], colours[1], rng, handle=False, **full)
     target = objects.cup(*v.target_m, colours[2], colours[3], rng, taper=_TAPER, wall_m=_WALL_M)
 
     side = -1.0 if v.hand == "left" else 1.0
@@ -113,6 +121,7 @@ def act(version: int, setting: Setting, skin: Colour, rng: np.random.Generator) 
     pour, surface = _poured(
         start, target_at, across, v.target_m, bottom, colours[4], rng, n=n, flows=flows, stops=stops
     )
+    remaining = _remaining(v.source_m, X_WS, across, colours[4], rng, flows=flows, stops=stops)
     radius = max(v.source_m[0] * 0.95, 0.028)
     style = HandStyle("wrap", radius, left=v.hand == "left", rise=0.30, scale=(1.0, 1.06, 0.94, 1.0)[version - 1])
     rests = np.zeros(n, dtype=np.int64)
@@ -122,6 +131,7 @@ def act(version: int, setting: Setting, skin: Colour, rng: np.random.Generator) 
         still("empty cup", target, pose((*target_at, 0), yaw=np.deg2rad(v.handle_deg)), n),
         pour,
         surface,
+        remaining,
     )
     return Act(actors, X_WH[:, :3, 3], (X_WS[:, :3, 3], np.array([[*target_at, 0.0]])))
 
@@ -139,6 +149,39 @@ def _lip(size_m: tuple[float, float], grip: float, tilt: float) -> tuple[float, 
         float(over * np.sin(tilt) + radius * np.cos(tilt)),
         float(over * np.cos(tilt) - radius * np.sin(tilt)),
     )
+
+
+def _remaining(
+    source_m: tuple[float, float],
+    X_WS: Floats,
+    across: Floats,
+    colour: Colour,
+    rng: np.random.Generator,
+    *,
+    flows: int,
+    stops: int,
+) -> Actor:
+    """The liquid in the full cup: level until it reaches the lip, then running out over it."""
+    radius, height = source_m
+    inner = radius - _SOURCE_WALL_M
+    brim = np.arctan2((1 - _FULL) * height, inner)
+    last = np.arctan2(height - _SOURCE_WALL_M, 0.6 * inner)
+    frames = np.arange(len(X_WS))
+    tilt = np.arccos(np.clip(X_WS[:, 2, 2], -1, 1))
+    share = np.clip((frames - flows) / (stops - flows), 0, 1)
+    # It lags behind a quick tilt, but not by more than this.
+    held = np.maximum(np.minimum(tilt, brim), tilt - np.deg2rad(50))
+    angle = np.where(frames < flows, held, held[flows] + share * (last - held[flows]))
+    steps = np.linspace(0, last, _N_LEVELS)
+    towards = float(np.arctan2(across[1], across[0]))
+    forms = tuple(
+        objects.liquid_in(
+            source_m, _FULL * height, step, colour, rng, towards=towards, taper=_SOURCE_TAPER, wall_m=_SOURCE_WALL_M
+        )
+        for step in steps
+    )
+    form = np.abs(angle[:, None] - steps).argmin(axis=1)
+    return Actor("liquid", forms, X_WS, np.where(frames < stops, form, -1))
 
 
 def _poured(

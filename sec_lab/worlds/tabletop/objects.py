@@ -92,6 +92,68 @@ def liquid(radius_m: float, colour: Colour, rng: np.random.Generator) -> Shape:
     return lathe(profile, textures.plain(colour, rng, mottle=0.015), n_sections=48, roughness=0.25)
 
 
+def liquid_in(
+    cup_m: tuple[float, float],
+    level_m: float,
+    tilt: float,
+    colour: Colour,
+    rng: np.random.Generator,
+    *,
+    towards: float = 0.0,
+    taper: float = 0.85,
+    wall_m: float = 0.0035,
+) -> Shape:
+    """Surface of the liquid in a tilted :func:`cup`, in the frame of the cup.
+
+    Parameters
+    ----------
+    cup_m : tuple of float
+        Radius and height of the cup.
+    level_m : float
+        Height of the surface in the upright cup.
+    tilt : float
+        Angle in radians, below a right angle, of the surface to the rim. Where the surface would stand higher than the
+        lip, it ends at the lip instead: the cup holds less.
+    colour : Colour
+    rng : numpy.random.Generator
+    towards : float, optional
+        Direction of the lip in the frame of the cup, an angle in radians about z.
+    taper, wall_m : float, optional
+        As those of the cup.
+
+    Examples
+    --------
+    >>> surface = liquid_in((0.04, 0.1), 0.06, 0.3, (200, 100, 50), np.random.default_rng(0))
+    >>> bool(surface.vertices_m[:, 2].min() < 0.05), bool(surface.vertices_m[:, 2].max() > 0.07)
+    (True, True)
+    """
+    (outside, height), slope = cup_m, np.tan(tilt)
+    lowest, highest = wall_m + 0.001, height - 0.002
+    # Fingers round the cup do not touch what is in it, though surfaces that near would count as touching: so it keeps
+    # off the wall a little, and more deep in the cup, where nobody looks and fingers press most.
+    widening = (1 - taper) * outside / height
+    base = taper * outside - wall_m - 0.0008
+    middle = min(level_m, highest - slope * (base + widening * highest))
+    angle = np.linspace(-np.pi, np.pi, 72, endpoint=False)
+    z = (middle + slope * base * np.cos(angle)) / (1 - slope * widening * np.cos(angle))
+    z = np.clip(z, lowest, highest)
+    radius = base + widening * z - 0.011 * np.clip((0.75 * height - z) / (0.35 * height), 0, 1)
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    # Where it would be below the bottom, the surface ends in a straight line.
+    dry = z <= lowest
+    if dry.any() and slope > 0:
+        edge = np.clip((lowest - middle) / slope, -radius[dry][0], radius[dry][0])
+        reach = np.sqrt(np.maximum(radius[dry] ** 2 - edge**2, 0))
+        x[dry], y[dry] = edge, np.clip(y[dry], -reach, reach)
+    ring = np.stack([x, y, middle + slope * x], axis=-1)
+    top = np.concatenate([ring.mean(axis=0)[None], ring])
+    following = 1 + (np.arange(len(ring)) + 1) % len(ring)
+    faces = np.stack([np.zeros(len(ring), dtype=np.int64), np.arange(1, len(ring) + 1), following], axis=-1)
+    uv = 0.5 + 0.5 * top[:, :2] / outside
+    surface = Shape(top, faces, uv, textures.plain(colour, rng, mottle=0.015), roughness=0.25)
+    return moved(surface, pose((0, 0, 0), yaw=towards))
+
+
 def jet(path_m: Floats, radius_m: float, colour: Colour, rng: np.random.Generator) -> Shape:
     """Falling liquid along a path."""
     n = len(path_m)
