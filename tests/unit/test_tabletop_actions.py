@@ -168,6 +168,19 @@ def test_both_settings_show_the_same_movements(action, version) -> None:
     assert len(kitchen.actors) > len(laboratory.actors)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("action", ACTIONS)
+def test_what_stands_aside_touches_only_the_table(action, version) -> None:
+    plan = plan_movie(action, version, "kitchen", seed=2011)
+    names = segment_names(plan)
+    pairs, touching = contacts(plan)
+    seen = [(names[int(i)], names[int(j)]) for i, j in pairs[touching.any(axis=0)]]
+    aside = [pair for pair in seen if any(name.endswith("aside") for name in pair)]
+    assert aside
+    assert {first for first, _ in aside} == {"table"}
+
+
 def test_another_seed_moves_otherwise() -> None:
     other = plan_movie("moving_object", 1, "laboratory", seed=SEED + 1)
     assert (other.actors[2].X_WB[0] != _plan("moving_object").actors[2].X_WB[0]).any()

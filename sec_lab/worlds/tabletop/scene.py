@@ -77,6 +77,9 @@ class Stage:
         self._source = self._graph.RegisterSource("tabletop")
         label_of = {name: label for label, name in segment_names(plan).items()}
         self._add(folder, "table", plan.table, TABLE, self._graph.world_frame_id())
+        # The range of depths in the shadow maps follows from the box round all bodies. Without something high up it
+        # ends below an arm that comes in from above, whose skin then gets patches of shadow.
+        self._add(folder, "height", _marker(plan.table), TABLE, self._graph.world_frame_id())
         self._forms: list[list[_Form]] = []
         for number, actor in enumerate(plan.actors):
             forms = []
@@ -180,6 +183,12 @@ def stage(plan: Plan) -> Iterator[Stage]:
     """
     with tempfile.TemporaryDirectory(prefix="sec_lab_") as folder:
         yield Stage(plan, Path(folder))
+
+
+def _marker(table: Shape) -> Shape:
+    """A crumb that no camera sees, behind it and above it."""
+    corners = np.array([(0.0, 0.0, 0.0), (0.01, 0.0, 0.0), (0.0, 0.01, 0.0)]) + (0.0, -1.05, 1.0)
+    return Shape(corners, np.array([(0, 1, 2)]), np.zeros((3, 2)), table.texture, table.roughness)
 
 
 def far_table(texture: NDArray[np.uint8], *, half_m: float = 1.1, turn: float = 0.0, roughness: float = 0.9) -> Shape:
