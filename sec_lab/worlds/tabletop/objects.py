@@ -124,7 +124,7 @@ def liquid_in(
     Examples
     --------
     >>> surface = liquid_in((0.04, 0.1), 0.06, 0.3, (200, 100, 50), np.random.default_rng(0))
-    >>> bool(surface.vertices_m[:, 2].min() < 0.05), bool(surface.vertices_m[:, 2].max() > 0.07)
+    >>> bool(surface.vertices_m[:, 2].min() < 0.055), bool(surface.vertices_m[:, 2].max() > 0.065)
     (True, True)
     """
     (outside, height), slope = cup_m, np.tan(tilt)
@@ -142,9 +142,10 @@ def liquid_in(
     # Where it would be below the bottom, the surface ends in a straight line.
     dry = z <= lowest
     if dry.any() and slope > 0:
-        edge = np.clip((lowest - middle) / slope, -radius[dry][0], radius[dry][0])
-        reach = np.sqrt(np.maximum(radius[dry] ** 2 - edge**2, 0))
+        edge = min((lowest - middle) / slope, radius[dry][0])
+        reach = np.sqrt(max(radius[dry][0] ** 2 - edge**2, 0))
         x[dry], y[dry] = edge, np.clip(y[dry], -reach, reach)
+        x = np.maximum(x, edge)
     ring = np.stack([x, y, middle + slope * x], axis=-1)
     top = np.concatenate([ring.mean(axis=0)[None], ring])
     following = 1 + (np.arange(len(ring)) + 1) % len(ring)

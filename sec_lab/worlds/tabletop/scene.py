@@ -187,7 +187,7 @@ def stage(plan: Plan) -> Iterator[Stage]:
 
 def _marker(table: Shape) -> Shape:
     """A crumb that no camera sees, behind it and above it."""
-    corners = np.array([(0.0, 0.0, 0.0), (0.01, 0.0, 0.0), (0.0, 0.01, 0.0)]) + (0.0, -1.05, 1.0)
+    corners = np.array([(0.0, -1.05, 1.0), (0.01, -1.05, 1.0), (0.0, -1.04, 1.0)])
     return Shape(corners, np.array([(0, 1, 2)]), np.zeros((3, 2)), table.texture, table.roughness)
 
 
