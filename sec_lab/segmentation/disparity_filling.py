@@ -96,22 +96,27 @@ def _fill_planes(disparity: Disparity, labels: NDArray[np.int32]) -> None:
             continue
         room = np.ptp(values[there]) / 2
         low, high = values[there].min() - room, values[there].max() + room
-        values[holes] = np.clip(_at(holes, width) @ plane, max(0, low), high)
+        values[holes] = np.clip(_height(plane, _place(holes, width)), max(0, low), high)
 
 
 def _plane(pixels: NDArray[np.int64], values: Disparity, width: int) -> NDArray[np.float64] | None:
     """Plane of least absolute deviations, by least squares weighted anew; None if too few pixels lie on it."""
     chosen = pixels[:: -(-len(pixels) // _MOST_FITTED)]
-    place, seen = _at(chosen, width), values[chosen].astype(np.float64)
+    place, seen = _place(chosen, width), values[chosen].astype(np.float64)
     weight = np.ones(len(chosen))
-    plane: NDArray[np.float64] = np.zeros(3)
     for _ in range(_FIT_ROUNDS):
-        root = np.sqrt(weight)
-        plane = np.asarray(np.linalg.lstsq(place * root[:, None], seen * root, rcond=None)[0])
-        weight = 1 / np.maximum(np.abs(place @ plane - seen), 0.05)
-    near = np.abs(place @ plane - seen) <= _PLANE_PX
-    return plane if near.mean() >= _PLANE_SHARE else None
+        # Sums without BLAS, whose last digits depend on the number of threads; a ridge keeps single rows solvable.
+        weighted = place * weight
+        square = (weighted[:, None] * place[None]).sum(axis=-1) + 1e-9 * np.eye(3)
+        plane = np.asarray(np.linalg.solve(square, (weighted * seen).sum(axis=-1)))
+        missed = np.abs(_height(plane, place) - seen)
+        weight = 1 / np.maximum(missed, 0.05)
+    return plane if (missed <= _PLANE_PX).mean() >= _PLANE_SHARE else None
 
 
-def _at(pixels: NDArray[np.int64], width: int) -> NDArray[np.float64]:
-    return np.stack([pixels % width / width, pixels // width / width, np.ones(len(pixels))], axis=1)
+def _place(pixels: NDArray[np.int64], width: int) -> NDArray[np.float64]:
+    return np.stack([pixels % width / width, pixels // width / width, np.ones(len(pixels))])
+
+
+def _height(plane: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(plane[0] * place[0] + plane[1] * place[1] + plane[2])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sec_lab.recording import Frame
 from sec_lab.segmentation.disparity_filling import fill_holes
 from sec_lab.segmentation.matching import MatcherOptions, estimate_range, matched
-from sec_lab.segmentation.stereo import Disparity, as_range, checked_pair, grey
+from sec_lab.segmentation.stereo import LEAST_SIDE_PX, Disparity, as_range, checked_pair, grey
 
 _LOOK_COLUMNS = 80
 _REFERENCE_RATE = 0.1
@@ -31,6 +31,9 @@ class DisparityEstimator:
     ----------
     range_px : (least, most) of float, optional
         Disparities that may occur, in place of the estimate.
+    reduction : int, optional
+        By what factor the pictures are shrunk before they are matched. A factor of 2 takes about a fifth of the time;
+        surfaces come out about as well, objects and hands a third worse.
     smoothing : int, optional
         Most frames in the mean of a pixel that rests, up to 255; 1 turns it off.
     change : float, optional
@@ -58,16 +61,20 @@ class DisparityEstimator:
         self,
         *,
         range_px: tuple[float, float] | None = None,
+        reduction: int = 1,
         smoothing: int = 16,
         change: float = 4.0,
         fill: bool = True,
         options: MatcherOptions = MatcherOptions(),  # noqa: B008 (frozen)
     ) -> None:
+        if reduction < 1 or reduction != int(reduction):
+            raise ValueError(f"reduction: expected a whole number from 1 on, got {reduction}")
         if not 1 <= smoothing <= 255:
             raise ValueError(f"smoothing: expected 1 to 255 frames, got {smoothing}")
         if not (np.isfinite(change) and change > 0):
             raise ValueError(f"change: expected a number of grey values above 0, got {change}")
         self._given = range_px
+        self._reduction = int(reduction)
         self._smoothing = smoothing
         self._change = change
         self._fill = fill
@@ -99,20 +106,47 @@ class DisparityEstimator:
             32 pixels.
         """
         checked_pair(left, right)
-        one, other = grey(left), grey(right)
+        size = (left.shape[0], left.shape[1])
+        if self._size is not None and size != self._size:
+            raise ValueError(f"left: expected the size of the pictures before, {self._size}, got {size}")
+        one, other = self._shrunk(left), self._shrunk(right)
         if self._size is None:
-            self._base = self._first_range(one, other)
-            self._size = (one.shape[0], one.shape[1])
-        elif one.shape != self._size:
-            raise ValueError(f"left: expected the size of the pictures before, {self._size}, got {one.shape}")
+            self._base = self._first_range(one, other, size[1])
+            self._size = size
         found = matched(one, other, range_px=self._range(one, other), options=self._options)
         if self._smoothing > 1:
             found = self._steadied(found, one)
-        return fill_holes(found) if self._fill else found
+        if self._fill:
+            found = fill_holes(found)
+        return found if self._reduction == 1 else self._enlarged(found)
 
-    def _first_range(self, one: NDArray[np.uint8], other: NDArray[np.uint8]) -> tuple[int, int]:
+    def _shrunk(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        import cv2
+
+        whole = grey(picture)
+        if self._reduction == 1:
+            return whole
+        height, width = (side // self._reduction for side in whole.shape)
+        if min(height, width) < LEAST_SIDE_PX:
+            raise ValueError(
+                f"reduction: expected one that leaves {LEAST_SIDE_PX} rows and columns, got {self._reduction} for "
+                f"{whole.shape}"
+            )
+        return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+    def _enlarged(self, found: Disparity) -> Disparity:
+        import cv2
+
+        assert self._size is not None
+        height, width = self._size
+        # Nothing in between: at the rim of an object there is no surface half-way to the one behind.
+        whole = cv2.resize(found, (width, height), interpolation=cv2.INTER_NEAREST)
+        return np.asarray(whole * np.float32(width / found.shape[1]), dtype=np.float32)
+
+    def _first_range(self, one: NDArray[np.uint8], other: NDArray[np.uint8], width: int) -> tuple[int, int]:
         if self._given is not None:
-            return as_range(self._given, one.shape[1])
+            least, most = as_range(self._given, width)
+            return least // self._reduction, -(-most // self._reduction)
         return estimate_range(one, other)
 
     def _range(self, one: NDArray[np.uint8], other: NDArray[np.uint8]) -> tuple[int, int]:

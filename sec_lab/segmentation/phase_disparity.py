@@ -27,7 +27,7 @@ def phase_disparity(
     right: NDArray[np.uint8],
     *,
     range_px: tuple[float, float] | None = None,
-    least_amplitude: float = 1.5,
+    least_amplitude: float = 0.7,
     nonlinearity: float = 0.8,
     spread_rad: float = 0.6,
     consistency_px: float = 1.0,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Disparity = NDArray[np.float32]
 
-_LEAST_SIDE_PX = 32
+LEAST_SIDE_PX = 32
 
 
 def checked_pair(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:
@@ -18,8 +18,8 @@ def checked_pair(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:
             raise ValueError(f"{name}: expected a picture of type uint8, got {told}")
         if picture.ndim not in (2, 3) or (picture.ndim == 3 and picture.shape[2] != 3):
             raise ValueError(f"{name}: expected shape (height, width) or (height, width, 3), got {picture.shape}")
-        if min(picture.shape[:2]) < _LEAST_SIDE_PX:
-            raise ValueError(f"{name}: expected at least {_LEAST_SIDE_PX} rows and columns, got {picture.shape}")
+        if min(picture.shape[:2]) < LEAST_SIDE_PX:
+            raise ValueError(f"{name}: expected at least {LEAST_SIDE_PX} rows and columns, got {picture.shape}")
     if left.shape[:2] != right.shape[:2]:
         raise ValueError(f"right: expected the size of left, {left.shape[:2]}, got {right.shape[:2]}")
 
