@@ -246,6 +246,11 @@ def test_a_stream_at_half_the_size_gives_pixels_of_the_whole() -> None:
     assert np.median(np.abs(found - 9)) <= 0.25
 
 
+def test_large_pictures_are_shrunk_by_themselves() -> None:
+    left, right = (np.tile(side, (4, 4)) for side in flat(9.0))  # 640 columns
+    np.testing.assert_array_equal(DisparityEstimator()(left, right), DisparityEstimator(reduction=2)(left, right))
+
+
 def test_a_stream_goes_through_a_recording() -> None:
     left, right = (np.repeat(side[..., None], 3, axis=2) for side in flat(8.0))
     found = list(disparities(Frame(index, left, right=right) for index in (3, 4)))
