@@ -4,6 +4,7 @@ import numpy as np
 
 from sec_lab.event_chain import EventChain
 from sec_lab.relations import scan_lines
+from sec_lab.segmentation import superparamagnetic_clustering
 from sec_lab.similarity import compare, pairwise_similarity, permutations
 
 
@@ -16,6 +17,7 @@ def warm() -> None:
     """
     for dtype in (np.uint8, np.uint16):
         scan_lines(np.zeros((1, 8), dtype))
+    superparamagnetic_clustering(np.zeros((8, 8, 3), np.uint8), depth_m=np.ones((8, 8)))
     chain = EventChain([[0, 2, 0], [0, 0, 2]], [(1, 2), (2, 3)])
     permutations(compare(chain, chain))
     pairwise_similarity([chain, chain])
