@@ -3,8 +3,9 @@
 import numpy as np
 
 from sec_lab.event_chain import EventChain
+from sec_lab.recording import Recording
 from sec_lab.relations import scan_lines
-from sec_lab.segmentation import superparamagnetic_clustering
+from sec_lab.segmentation import lattice_energy, track_segments, warp_labels
 from sec_lab.similarity import compare, pairwise_similarity, permutations
 
 
@@ -17,7 +18,12 @@ def warm() -> None:
     """
     for dtype in (np.uint8, np.uint16):
         scan_lines(np.zeros((1, 8), dtype))
-    superparamagnetic_clustering(np.zeros((8, 8, 3), np.uint8), depth_m=np.ones((8, 8)))
+    movie = np.zeros((4, 8, 8, 3), np.uint8)
+    for _ in track_segments(Recording.from_frames(movie, depth=np.ones(movie.shape[:3]))):
+        pass
+    labels = np.ones((8, 8), np.int64)
+    lattice_energy(movie[0], labels)
+    warp_labels(labels, movie[0], movie[1], np.zeros((4, 4, 2), np.float32))
     chain = EventChain([[0, 2, 0], [0, 0, 2]], [(1, 2), (2, 3)])
     permutations(compare(chain, chain))
     pairwise_similarity([chain, chain])

@@ -77,8 +77,8 @@ def naive_sweeps(
     return labels
 
 
-def naive_domains(labels: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Connected pixels of one label, numbered in the order of their first pixel."""
+def naive_domains(labels: NDArray[np.integer], bonds: Bonds | None = None, least: int = 0) -> NDArray[np.int64]:
+    """Pixels of one label that are connected, by bonds above the least if there are any, in order of the first."""
     domains = np.full(labels.shape, -1)
     n = 0
     for start in np.ndindex(*labels.shape):
@@ -91,6 +91,8 @@ def naive_domains(labels: NDArray[np.integer]) -> NDArray[np.int64]:
             for dy, dx in PROPOSED:
                 other = y + dy, x + dx
                 inside = 0 <= other[0] < labels.shape[0] and 0 <= other[1] < labels.shape[1]
+                if bonds is not None and bonds.get(frozenset(((y, x), other)), least) <= least:
+                    continue
                 if inside and domains[other] < 0 and labels[other] == labels[start]:
                     domains[other] = n
                     stack.append(other)

@@ -4,7 +4,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from sec_lab.segmentation._potts_kernels import FORWARD
+from sec_lab.segmentation._potts_kernels import FORWARD_COLUMNS, FORWARD_ROWS
 
 Integers = NDArray[np.int64]
 Domains = NDArray[np.int32]
@@ -98,6 +98,62 @@ def domains_of(labels: NDArray[np.integer]) -> tuple[Domains, Integers, Integers
 
 
 @nb.njit(cache=True, nogil=True)
+def bond_domains_of(
+    labels: NDArray[np.integer], couplings: Couplings, least: int
+) -> tuple[Domains, Integers, Integers]:
+    """Pixels of one label that bonds above ``least`` connect; what it gives is like that of :func:`domains_of`."""
+    height, width = labels.shape
+    node = np.empty((height, width), np.int32)
+    parents = np.empty(height * width, np.int64)
+    n_nodes = 0
+    for y in range(height):
+        for x in range(width):
+            label = labels[y, x]
+            mine = -1
+            if (
+                x
+                and labels[y, x - 1] == label
+                and couplings[0, 2 * (y & 1) + ((x - 1) & 1), (y >> 1) + 1, ((x - 1) >> 1) + 1] > least
+            ):
+                mine = node[y, x - 1]
+            if y:
+                for direction in range(1, 4):
+                    u = x - FORWARD_COLUMNS[direction]
+                    if (
+                        0 <= u < width
+                        and labels[y - 1, u] == label
+                        and couplings[direction, 2 * ((y - 1) & 1) + (u & 1), ((y - 1) >> 1) + 1, (u >> 1) + 1] > least
+                    ):
+                        other = node[y - 1, u]
+                        if mine < 0:
+                            mine = other
+                        elif mine != other:
+                            join(parents, mine, other)
+            if mine < 0:
+                mine = n_nodes
+                parents[n_nodes] = n_nodes
+                n_nodes += 1
+            node[y, x] = mine
+    number = np.empty(n_nodes, np.int32)
+    n = 0
+    for i in range(n_nodes):
+        root = root_of(parents, i)
+        if root == i:
+            number[i] = n
+            n += 1
+        else:
+            number[i] = number[root]
+    sizes, label_of = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    for y in range(height):
+        for x in range(width):
+            domain = number[node[y, x]]
+            node[y, x] = domain
+            sizes[domain] += 1
+            label_of[domain] = labels[y, x]
+    return node, sizes, label_of
+
+
+@nb.njit(cache=True, nogil=True)
 def _entry(keys: Integers, entries: Domains, key: int) -> np.uint64:
     """Field of a key in a hash table, or the free one where it belongs; ``entries`` is -1 in free fields."""
     mask = np.uint64(keys.size - 1)
@@ -105,6 +161,65 @@ def _entry(keys: Integers, entries: Domains, key: int) -> np.uint64:
     while entries[field] >= 0 and keys[field] != key:
         field = (field + np.uint64(1)) & mask
     return field
+
+
+@nb.njit(cache=True, nogil=True)
+def _mark_borders(border: Domains, here: Domains, east: Domains, a: Domains, b: Domains, c: Domains) -> None:
+    """Mark pixels with a neighbour of another domain to the right or below by anything but 0."""
+    for x in range(border.size):
+        mine = here[x]
+        border[x] = (east[x] ^ mine) | (a[x] ^ mine) | (b[x] ^ mine) | (c[x] ^ mine)
+
+
+@nb.njit(cache=True, nogil=True)
+def _add_row(
+    domains: Domains,
+    couplings: Couplings,
+    n_domains: int,
+    y: int,
+    border: Domains,
+    words: NDArray[np.uint64],
+    keys: Integers,
+    entries: Domains,
+    pairs: Integers,
+    sums: Integers,
+    counts: Integers,
+    n: int,
+) -> int:
+    """Add the bonds of a row's pixels to a table of pairs; their new number."""
+    height, width = domains.shape
+    x = 0
+    last_key, last = np.int64(-1), np.int64(0)
+    while x < width:
+        if border[x] == 0:
+            # Most pixels are inside of a domain: eight of them at a time.
+            word = x >> 1
+            if x & 1 == 0 and x + 8 < width and words[word] | words[word + 1] | words[word + 2] | words[word + 3] == 0:
+                x += 7
+            x += 1
+            continue
+        here = domains[y, x]
+        for direction in range(4):
+            down, right = y + FORWARD_ROWS[direction], x + FORWARD_COLUMNS[direction]
+            if down >= height or right < 0 or right >= width:
+                continue
+            there = domains[down, right]
+            if there == here:
+                continue
+            low, high = np.int64(min(here, there)), np.int64(max(here, there))
+            key = low * n_domains + high
+            if key != last_key:
+                field = _entry(keys, entries, key)
+                if entries[field] < 0:
+                    keys[field], entries[field] = key, n
+                    pairs[n, 0], pairs[n, 1] = low, high
+                    sums[n], counts[n] = 0, 0
+                    n += 1
+                last_key, last = key, np.int64(entries[field])
+            sums[last] += couplings[direction, 2 * (y & 1) + (x & 1), (y >> 1) + 1, (x >> 1) + 1]
+            counts[last] += 1
+        x += 1
+    return n
 
 
 @nb.njit(cache=True, nogil=True)
@@ -127,60 +242,38 @@ def borders_of(domains: Domains, couplings: Couplings, n_domains: int) -> tuple[
         Number of bonds across it.
     """
     height, width = domains.shape
-    keys, entries = np.zeros(1024, np.int64), np.full(1024, -1, np.int32)
-    pairs, sums, counts = np.empty((512, 2), np.int64), np.empty(512, np.int64), np.empty(512, np.int64)
+    space = 1
+    while space < 8 * width:
+        space *= 2
+    keys, entries = np.zeros(2 * space, np.int64), np.full(2 * space, -1, np.int32)
+    pairs, sums, counts = np.empty((space, 2), np.int64), np.empty(space, np.int64), np.empty(space, np.int64)
     n = 0
-    last_key, last = -1, 0
+    # The first and the last pixel of a row lack neighbours: they are looked at in any case.
+    border = np.ones(width + 8, np.int32)
+    words = border[: (width + 7) & ~7].view(np.uint64)
     for y in range(height):
-        below = min(y + 1, height - 1)
-        for x in range(width):
-            here = domains[y, x]
-            right, left = min(x + 1, width - 1), max(x - 1, 0)
-            # Beyond the picture a pixel is its own neighbour, and that is no border.
-            if (
-                domains[y, right] == here
-                and domains[below, x] == here
-                and (domains[below, right] == here or right == x)
-                and (domains[below, left] == here or left == x)
-            ):
-                continue
-            for direction in range(4):
-                down, aside = FORWARD[direction]
-                if y + down >= height or x + aside < 0 or x + aside >= width:
-                    continue
-                there = domains[y + down, x + aside]
-                if there == here:
-                    continue
-                key = np.int64(min(here, there)) * n_domains + max(here, there)
-                if key != last_key:
-                    field = _entry(keys, entries, key)
-                    if entries[field] < 0:
-                        if n == len(sums):
-                            keys, entries, pairs, sums, counts = _grown(pairs, sums, counts, n_domains)
-                            field = _entry(keys, entries, key)
-                        keys[field], entries[field] = key, n
-                        pairs[n, 0], pairs[n, 1] = min(here, there), max(here, there)
-                        sums[n] = counts[n] = 0
-                        n += 1
-                    last_key, last = key, entries[field]
-                sums[last] += couplings[direction, 2 * (y & 1) + (x & 1), (y >> 1) + 1, (x >> 1) + 1]
-                counts[last] += 1
+        if width > 2:
+            row, below = domains[y], domains[min(y + 1, height - 1)]
+            _mark_borders(border[1 : width - 1], row[1:-1], row[2:], below[:-2], below[1:-1], below[2:])
+        if n + 4 * width > len(sums):
+            keys, entries, pairs, sums, counts = _grown(pairs, sums, counts, n, n_domains)
+        n = _add_row(domains, couplings, n_domains, y, border, words, keys, entries, pairs, sums, counts, n)
     return pairs[:n].copy(), sums[:n].copy(), counts[:n].copy()
 
 
 @nb.njit(cache=True, nogil=True)
 def _grown(
-    pairs: Integers, sums: Integers, counts: Integers, n_domains: int
+    pairs: Integers, sums: Integers, counts: Integers, n: int, n_domains: int
 ) -> tuple[Integers, Domains, Integers, Integers, Integers]:
-    """A table of pairs that is full, in four times the space."""
-    n = len(sums)
-    keys, entries = np.zeros(8 * n, np.int64), np.full(8 * n, -1, np.int32)
+    """A table of n pairs in four times the space."""
+    space = 4 * len(sums)
+    keys, entries = np.zeros(2 * space, np.int64), np.full(2 * space, -1, np.int32)
     new_pairs, new_sums, new_counts = (
-        np.empty((4 * n, 2), np.int64),
-        np.empty(4 * n, np.int64),
-        np.empty(4 * n, np.int64),
+        np.empty((space, 2), np.int64),
+        np.empty(space, np.int64),
+        np.empty(space, np.int64),
     )
-    new_pairs[:n], new_sums[:n], new_counts[:n] = pairs, sums, counts
+    new_pairs[:n], new_sums[:n], new_counts[:n] = pairs[:n], sums[:n], counts[:n]
     for i in range(n):
         key = pairs[i, 0] * n_domains + pairs[i, 1]
         field = _entry(keys, entries, key)

@@ -5,9 +5,9 @@ The picture is taken apart into four planes as on a checkerboard of 2×2 fields:
 a row of it lie in rows of other planes: the compiler turns the update into vector instructions. Each plane has a rim
 of one, where couplings are 0 and labels ``OUTSIDE``.
 
-Sweeps run in strips of rows, one a thread. A strip begins with as many rows more on both sides as a change can
-travel, and forgets one on each side with every sweep; so strips need not wait for each other, and the labels do not
-depend on how many there are. Random numbers belong to a place and a sweep.
+Everything is local to a call and runs on one thread: what a frame needs is done in a fraction of the time in which the
+threads of a parallel loop find together on a busy machine. Frames are worked at side by side instead, see
+:mod:`sec_lab.segmentation.tracking`.
 """
 
 import numba as nb
@@ -27,8 +27,11 @@ LOWEST = -127
 OUTSIDE = -1
 """Label beyond the picture."""
 
-FORWARD = ((0, 1), (1, 0), (1, 1), (1, -1))
-"""Steps (rows, columns) to the neighbours of which a pixel keeps the coupling: east, south, south-east, south-west."""
+FORWARD_ROWS = np.array([0, 1, 1, 1])
+"""Rows to the neighbours of which a pixel keeps the coupling: east, south, south-east, south-west."""
+
+FORWARD_COLUMNS = np.array([1, 0, 1, -1])
+"""Columns to the same."""
 
 
 @nb.njit(cache=True, nogil=True)
@@ -75,18 +78,17 @@ def _row_distances(distance: NDArray[np.float32], channels: Channels, y: int, di
     return first, n
 
 
-@nb.njit(cache=True, nogil=True, parallel=True)
-def difference_sum(channels: Channels, n_strips: int) -> int:
+@nb.njit(cache=True, nogil=True)
+def difference_sum(channels: Channels) -> int:
     """Sum of the colour distances of all pairs of neighbours, in sixteenths."""
     height, width = channels.shape[1:]
-    sums = np.zeros(n_strips, np.int64)
-    for strip in nb.prange(n_strips):
-        distance = np.empty(width, np.float32)
-        for y in range(height * strip // n_strips, height * (strip + 1) // n_strips):
-            for direction in range(4):
-                _, n = _row_distances(distance, channels, y, direction)
-                sums[strip] += _sum(distance, n)
-    return sums.sum()
+    distance = np.empty(width, np.float32)
+    total = 0
+    for y in range(height):
+        for direction in range(4):
+            _, n = _row_distances(distance, channels, y, direction)
+            total += _sum(distance, n)
+    return total
 
 
 @nb.njit(cache=True, nogil=True)
@@ -97,8 +99,8 @@ def _to_couplings(coupling: Couplings, distance: NDArray[np.float32], slope: np.
         coupling[x] = np.int8(np.floor(value + np.float32(0.5)))
 
 
-@nb.njit(cache=True, nogil=True, parallel=True)
-def fill_couplings(couplings: Couplings, channels: Channels, scale: float, n_strips: int) -> int:
+@nb.njit(cache=True, nogil=True)
+def fill_couplings(couplings: Couplings, channels: Channels, scale: float) -> int:
     """Couplings J = 1 − distance / scale of all pairs of neighbours.
 
     Parameters
@@ -107,7 +109,6 @@ def fill_couplings(couplings: Couplings, channels: Channels, scale: float, n_str
         Filled in: direction, plane, row, column; the rim is left alone.
     channels : (3, height, width) uint8
     scale : float
-    n_strips : int
 
     Returns
     -------
@@ -116,25 +117,22 @@ def fill_couplings(couplings: Couplings, channels: Channels, scale: float, n_str
     """
     height, width = channels.shape[1:]
     slope = np.float32(UNIT / scale)
-    sums = np.zeros(n_strips, np.int64)
-    for strip in nb.prange(n_strips):
-        distance = np.empty(width, np.float32)
-        row = np.zeros(width + 2, np.int8)
-        for y in range(height * strip // n_strips, height * (strip + 1) // n_strips):
-            for direction in range(4):
-                first, n = _row_distances(distance, channels, y, direction)
-                sums[strip] += _sum(distance, n)
-                row[0] = 0
-                row[first + n :] = 0
-                _to_couplings(row[first:], distance, slope, n)
-                even, odd = (
-                    couplings[direction, 2 * (y & 1), (y >> 1) + 1],
-                    couplings[direction, 2 * (y & 1) + 1, (y >> 1) + 1],
-                )
-                for j in range((width + 1) >> 1):
-                    even[j + 1] = row[2 * j]
-                    odd[j + 1] = row[2 * j + 1]
-    return sums.sum()
+    distance = np.empty(width, np.float32)
+    row = np.zeros(width + 2, np.int8)
+    total = 0
+    for y in range(height):
+        for direction in range(4):
+            first, n = _row_distances(distance, channels, y, direction)
+            total += _sum(distance, n)
+            row[0] = 0
+            row[first + n :] = 0
+            _to_couplings(row[first:], distance, slope, n)
+            even = couplings[direction, 2 * (y & 1), (y >> 1) + 1]
+            odd = couplings[direction, 2 * (y & 1) + 1, (y >> 1) + 1]
+            for j in range((width + 1) >> 1):
+                even[j + 1] = row[2 * j]
+                odd[j + 1] = row[2 * j + 1]
+    return total
 
 
 @nb.njit(cache=True, nogil=True)
@@ -142,7 +140,7 @@ def cut_bonds(couplings: Couplings, depth: NDArray[np.float32], limit: float) ->
     """Make the coupling of neighbours repel where depth jumps by more than a limit; 0 is no measurement."""
     height, width = depth.shape
     for direction in range(4):
-        down, right = FORWARD[direction]
+        down, right = FORWARD_ROWS[direction], FORWARD_COLUMNS[direction]
         for y in range(height - down):
             for x in range(max(0, -right), width - max(0, right)):
                 here, there = depth[y, x], depth[y + down, x + right]
@@ -156,7 +154,7 @@ def bond_sum(couplings: Couplings, labels: NDArray[np.integer]) -> int:
     height, width = labels.shape
     total = 0
     for direction in range(4):
-        down, right = FORWARD[direction]
+        down, right = FORWARD_ROWS[direction], FORWARD_COLUMNS[direction]
         for y in range(height - down):
             for x in range(max(0, -right), width - max(0, right)):
                 if labels[y, x] == labels[y + down, x + right]:
@@ -232,22 +230,19 @@ def _accept(spins: Spins, own: np.uint64, other: np.uint64, gain: Spins, n: np.u
 @nb.njit(cache=True, nogil=True)
 def _update_row(
     spins: Spins,
-    spin_rows: int,
     couplings: Couplings,
-    coupling_rows: int,
+    rows: int,
     columns: int,
     noise: Spins,
     gain: Spins,
     plane: int,
     row: int,
-    above: int,
     lowest: np.int16,
     draw: np.uint64,
 ) -> None:
     """One Metropolis step for a row of a plane: every pixel may take over the label of one neighbour.
 
-    ``spins`` and ``couplings`` are flat views of planes with so many rows and columns; row r of the planes of spins
-    has its couplings in row r + ``above``.
+    ``spins`` and ``couplings`` are flat views of planes with so many rows and columns.
     """
     n = np.uint64(columns - 2)
     odd_row, odd_column = plane >> 1, plane & 1
@@ -255,16 +250,15 @@ def _update_row(
     # Of an even row the one above lies a row back in its plane, of an odd one the row below a row on; columns alike.
     north, south = row - 1 + odd_row, row + odd_row
     west = odd_column
-    own = (plane * spin_rows + row) * columns + 1
-    w = (across * spin_rows + row) * columns + west
-    u, d = (down * spin_rows + north) * columns + 1, (down * spin_rows + south) * columns + 1
-    nw, sw = (aslant * spin_rows + north) * columns + west, (aslant * spin_rows + south) * columns + west
-    r, rn = row + above, north + above
-    to_e = (plane * coupling_rows + r) * columns + 1
-    to_w = (across * coupling_rows + r) * columns + west
-    to_u = (down * coupling_rows + rn) * columns + 1
-    to_nw = (aslant * coupling_rows + rn) * columns + west
-    one = 4 * coupling_rows * columns
+    own = (plane * rows + row) * columns + 1
+    w = (across * rows + row) * columns + west
+    u, d = (down * rows + north) * columns + 1, (down * rows + south) * columns + 1
+    nw, sw = (aslant * rows + north) * columns + west, (aslant * rows + south) * columns + west
+    to_e = (plane * rows + row) * columns + 1
+    to_w = (across * rows + row) * columns + west
+    to_u = (down * rows + north) * columns + 1
+    to_nw = (aslant * rows + north) * columns + west
+    one = 4 * rows * columns
     to_d, to_se, to_sw, to_ne = one + to_e, 2 * one + to_e, 3 * one + to_e, 3 * one + to_nw + 1
     to_u, to_nw = one + to_u, 2 * one + to_nw
     which = draw & np.uint64(7)
@@ -321,68 +315,26 @@ def _update_row(
 
 
 @nb.njit(cache=True, nogil=True)
-def _sweep_strip(
-    planes: Spins, couplings: Couplings, noise: Spins, lowest: Spins, seed: np.uint64, begin: int, end: int
-) -> Spins:
-    """All sweeps over the half rows ``begin`` … ``end`` − 1 (planes without rim), in a copy with rows to spare."""
-    n_sweeps = len(lowest)
-    half = planes.shape[1] - 2
-    first, last = max(0, begin - n_sweeps), min(half, end + n_sweeps)
-    strip = planes[:, first : last + 2].copy()
-    rows, columns = strip.shape[1], strip.shape[2]
-    spins, flat = strip.reshape(-1), couplings.reshape(-1)
-    gain = np.empty(columns, np.int16)
-    for sweep in range(n_sweeps):
-        spare = n_sweeps - 1 - sweep
-        top, bottom = max(0, begin - spare), min(half, end + spare)
-        for plane in range(4):
-            # Odd rows look at the even row below them, which has to be of this sweep.
-            stop = min(half, bottom + 1) if plane < 2 else bottom
-            for row in range(top, stop):
-                place = np.uint64((sweep * 4 + plane) * half + row)
-                draw = _mixed(seed + (place + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15))
-                _update_row(
-                    spins,
-                    rows,
-                    flat,
-                    half + 2,
-                    columns,
-                    noise[sweep],
-                    gain,
-                    plane,
-                    row - first + 1,
-                    first,
-                    lowest[sweep],
-                    draw,
-                )
-    return strip[:, begin - first + 1 : end - first + 1]
-
-
-@nb.njit(cache=True, nogil=True, parallel=True)
-def sweep(planes: Spins, couplings: Couplings, noise: Spins, lowest: Spins, seed: np.uint64, n_strips: int) -> Spins:
-    """Metropolis sweeps over all pixels.
+def sweep(planes: Spins, couplings: Couplings, noise: Spins, lowest: Spins, seed: np.uint64) -> None:
+    """Metropolis sweeps over all pixels, in place.
 
     Parameters
     ----------
     planes : (4, height / 2 + 2, width / 2 + 2) int16
-        Labels; not changed.
+        Labels.
     couplings : (4, 4, height / 2 + 2, width / 2 + 2) int8
     noise : (n_sweeps, n) int16
         Draws of the energy that a change may cost, n ≥ width / 2 of every sweep.
     lowest : (n_sweeps,) int16
         Couplings below count as this.
     seed : uint64
-    n_strips : int
-        Changes nothing in the result.
-
-    Returns
-    -------
-    (4, height / 2 + 2, width / 2 + 2) int16
     """
-    half = planes.shape[1] - 2
-    new = planes.copy()
-    for strip in nb.prange(n_strips):
-        begin, end = half * strip // n_strips, half * (strip + 1) // n_strips
-        if end > begin:
-            new[:, begin + 1 : end + 1] = _sweep_strip(planes, couplings, noise, lowest, seed, begin, end)
-    return new
+    rows, columns = planes.shape[1], planes.shape[2]
+    spins, flat = planes.reshape(-1), couplings.reshape(-1)
+    gain = np.empty(columns, np.int16)
+    for n_swept in range(len(lowest)):
+        for plane in range(4):
+            for row in range(rows - 2):
+                place = np.uint64((n_swept * 4 + plane) * (rows - 2) + row)
+                draw = _mixed(seed + (place + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15))
+                _update_row(spins, flat, rows, columns, noise[n_swept], gain, plane, row + 1, lowest[n_swept], draw)

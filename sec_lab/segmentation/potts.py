@@ -28,8 +28,14 @@ MAX_SPIN = (1 << 15) - 1
 N_SPINS = 256
 """Number q of spin values with which a lattice without labels begins."""
 
+LOWEST = -127
+"""Lowest coupling of all, in the kernels' whole numbers (32 is J = 1)."""
+
 SOFT = 2
-"""Lowest coupling in sweeps that smooth, in the kernels' whole numbers (32 is J = 1)."""
+"""Lowest coupling in sweeps that smooth, in the same numbers."""
+
+_FIRM = 8
+"""A coupling that holds a domain together, in the kernels' whole numbers (32 is J = 1)."""
 
 _MIN_SCALE = 1.0
 _NOISE_SEED, _NOISE_LENGTH = 2009, 8192
@@ -44,7 +50,7 @@ class PottsParameters:
     alpha : float, optional
         Δ in multiples of the mean colour difference of neighbours: the larger, the fewer segments. Above 0, up to 10.
     colour_space : {"lab", "rgb"}, optional
-        Of the colours g. Lab is CIE L*a*b* with L* scaled to 255 and a*, b* counting 1.5 fold: shadows weigh less.
+        Of the colours g. Lab is CIE L*a*b* with L* from 0 to 170 instead of 100: shadows weigh less than in RGB.
     blur_sigma_px : float, optional
         Standard deviation of the Gaussian blur before couplings are computed; 0 for none.
     anneal_sweeps : int, optional
@@ -82,7 +88,7 @@ class PottsParameters:
 
     alpha: float = 6.0
     colour_space: ColourSpace = "lab"
-    blur_sigma_px: float = 0.7
+    blur_sigma_px: float = 0.0
     anneal_sweeps: int = 20
     relax_sweeps: int = 4
     smooth_sweeps: int = 2
@@ -138,7 +144,7 @@ def superparamagnetic_clustering(
     depth_m : (height, width) array_like of float, optional
         Metres along the optical axis; 0 where nothing was measured.
     seed : int, optional
-        Same seed, same labels, whatever the number of threads.
+        Same seed, same labels.
 
     Returns
     -------
@@ -245,24 +251,43 @@ def picture_couplings(
     scale : float
         Δ of this picture, in units of colour.
     """
+    height, width = image.shape[:2]
+    couplings = np.zeros((4, 4, (height + 1) // 2 + 2, (width + 1) // 2 + 2), np.int8)
+    channels = colour_channels(image, parameters=parameters)
+    own = channel_couplings(couplings, channels, parameters=parameters, depth_m=depth_m, scale=scale)
+    return couplings, own
+
+
+def channel_couplings(
+    couplings: Couplings,
+    channels: Channels,
+    *,
+    parameters: PottsParameters,
+    depth_m: NDArray[np.float32] | None = None,
+    scale: float | None = None,
+) -> float:
+    """Fill in the couplings of a picture of which the channels are there already; see :func:`picture_couplings`.
+
+    Returns
+    -------
+    float
+        Δ of this picture, in units of colour.
+    """
     from sec_lab.segmentation import _potts_kernels
 
-    channels = colour_channels(image, parameters=parameters)
     height, width = channels.shape[1:]
     n_bonds = height * (width - 1) + width * (height - 1) + 2 * (height - 1) * (width - 1)
 
     def scale_of(sixteenths: int) -> float:
         return float(max(parameters.alpha * sixteenths / 16 / max(n_bonds, 1), _MIN_SCALE))
 
-    couplings = np.zeros((4, 4, (height + 1) // 2 + 2, (width + 1) // 2 + 2), np.int8)
-    n_strips = n_threads()
     if scale is None:
-        scale = scale_of(_potts_kernels.difference_sum(channels, n_strips))
-    total = _potts_kernels.fill_couplings(couplings, channels, scale, n_strips)
+        scale = scale_of(_potts_kernels.difference_sum(channels))
+    total = _potts_kernels.fill_couplings(couplings, channels, scale)
     if depth_m is not None:
         # Departure: a bond that is cut repels, or the pixels of a border where depth is unsure outvoted the others.
         _potts_kernels.cut_bonds(couplings, depth_m, parameters.depth_jump_m)
-    return couplings, scale_of(total)
+    return scale_of(total)
 
 
 def colour_channels(image: NDArray[np.uint8], *, parameters: PottsParameters) -> Channels:
@@ -282,7 +307,7 @@ def colour_channels(image: NDArray[np.uint8], *, parameters: PottsParameters) ->
     --------
     >>> red = np.full((1, 1, 3), (255, 0, 0), dtype=np.uint8)
     >>> colour_channels(red, parameters=PottsParameters(colour_space="lab")).ravel()
-    array([136, 248, 228], dtype=uint8)
+    array([ 91, 208, 195], dtype=uint8)
     """
     import cv2
 
@@ -295,14 +320,13 @@ def colour_channels(image: NDArray[np.uint8], *, parameters: PottsParameters) ->
     channels = np.empty((3, *image.shape[:2]), np.uint8)
     for i in range(3):
         cv2.extractChannel(values, i, channels[i])
-        if lab and i:
-            # 128 is grey and stays where it is; strong colours end at 0 and 255.
-            cv2.convertScaleAbs(np.maximum(channels[i], 43), channels[i], 1.5, -64)
+    if lab:
+        cv2.convertScaleAbs(channels[0], channels[0], 2 / 3)
     return channels
 
 
 def swept(
-    spins: NDArray[np.int16], couplings: Couplings, temperatures: list[float], *, seed: int, lowest: int | None = None
+    spins: NDArray[np.int16], couplings: Couplings, temperatures: list[float], *, seed: int, lowest: int = LOWEST
 ) -> NDArray[np.int16]:
     """Label image after Metropolis sweeps, one for every temperature.
 
@@ -327,8 +351,8 @@ def swept(
     planes = np.empty(couplings.shape[1:], np.int16)
     _potts_kernels.to_planes(planes, spins)
     noise = noise_table(tuple(temperatures), couplings.shape[3])
-    bounds = np.full(len(noise), _potts_kernels.LOWEST if lowest is None else lowest, np.int16)
-    planes = _potts_kernels.sweep(planes, couplings, noise, bounds, np.uint64(seed), n_threads())
+    bounds = np.full(len(noise), lowest, np.int16)
+    _potts_kernels.sweep(planes, couplings, noise, bounds, np.uint64(seed))
     new = np.empty_like(spins)
     _potts_kernels.from_planes(new, planes)
     return new
@@ -353,7 +377,8 @@ def joined(
     """
     from sec_lab.segmentation import _domain_kernels
 
-    domains, sizes, _ = _domain_kernels.domains_of(spins)
+    # Pixels of mixed colour between two domains may have the spin of one of them with hardly a bond to it.
+    domains, sizes, _ = _domain_kernels.bond_domains_of(spins, couplings, _FIRM)
     borders = _domain_kernels.borders_of(domains, couplings, len(sizes))
     roots = _domain_kernels.merge_domains(*borders, sizes, parameters.minimum_size_px, parameters.minimum_thickness_px)
     totals = np.bincount(roots, weights=sizes, minlength=len(sizes))
@@ -374,13 +399,6 @@ def noise_table(temperatures: tuple[float, ...], width: int) -> NDArray[np.int16
     draws = np.random.default_rng(_NOISE_SEED).exponential(size=_NOISE_LENGTH + width)
     energies: NDArray[np.int16] = np.minimum(np.outer(temperatures, UNIT * draws), 1 << 13).astype(np.int16)
     return energies
-
-
-def n_threads() -> int:
-    """Number of threads that kernels may use; what they give does not depend on it."""
-    import numba
-
-    return int(numba.get_num_threads())
 
 
 def as_picture(image: ArrayLike) -> NDArray[np.uint8]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sec_lab.segmentation import PottsParameters, superparamagnetic_clustering
-from sec_lab.segmentation._domain_kernels import borders_of, domains_of, merge_domains
+from sec_lab.segmentation._domain_kernels import bond_domains_of, borders_of, domains_of, merge_domains
 from sec_lab.segmentation.potts import (
     colour_channels,
     lattice_energy,
@@ -111,6 +111,16 @@ def test_domains(size: tuple[int, int], seed: int) -> None:
     labels = np.random.default_rng(seed).integers(0, 3, size)
     domains, sizes, label_of = domains_of(labels)
     assert (domains == naive_domains(labels)).all()
+    assert (sizes == np.bincount(domains.ravel())).all()
+    assert (label_of[domains] == labels).all()
+
+
+@given(SIZES, SEEDS, st.sampled_from([0, 8]))
+def test_domains_that_bonds_hold_together(size: tuple[int, int], seed: int, least: int) -> None:
+    couplings, _ = picture_couplings(picture(size, seed), parameters=RAW)
+    labels = np.random.default_rng(seed).integers(0, 2, size, dtype=np.int16)
+    domains, sizes, label_of = bond_domains_of(labels, couplings, least)
+    assert (domains == naive_domains(labels, bonds_of(couplings, size), least)).all()
     assert (sizes == np.bincount(domains.ravel())).all()
     assert (label_of[domains] == labels).all()
 
@@ -223,26 +233,12 @@ def test_number_of_threads_changes_nothing(size: tuple[int, int]) -> None:
     assert np.unique(found[0]).tolist() == list(range(1, found[0].max() + 1))
 
 
-def test_number_of_strips_changes_nothing() -> None:
-    from sec_lab.segmentation._potts_kernels import sweep, to_planes
-
-    couplings, _ = picture_couplings(picture((37, 40), 5), parameters=RAW)
-    planes = np.empty(couplings.shape[1:], np.int16)
-    to_planes(planes, np.random.default_rng(0).integers(0, 9, (37, 40), dtype=np.int16))
-    noise, lowest = noise_table((1.0,) * 6, couplings.shape[3]), np.full(6, -127, np.int16)
-    first = sweep(planes, couplings, noise, lowest, np.uint64(7), 1)
-    for n_strips in (2, 3, 7, 40):
-        assert (sweep(planes, couplings, noise, lowest, np.uint64(7), n_strips) == first).all()
-    assert (sweep(planes, couplings, noise, lowest, np.uint64(8), 1) != first).any()
-
-
-def test_lab_channels_end_at_the_borders_of_their_range() -> None:
-    image = np.array([[(0, 0, 255), (255, 0, 0), (255, 255, 0), (128, 128, 128)]], dtype=np.uint8)
+def test_grey_has_no_colour_in_lab() -> None:
+    image = np.array([[(0, 0, 0), (255, 255, 255), (128, 128, 128)]], dtype=np.uint8)
     channels = colour_channels(image, parameters=PottsParameters(blur_sigma_px=0))
-    # OpenCV's 8-bit Lab gives b* + 128 = 20 for blue and 223 for yellow; 1.5 fold from 128 on they are −34 and 270.
-    assert channels[2, 0, 0] == 0
-    assert channels[2, 0, 2] == 255
-    assert channels[1:, 0, 3].tolist() == [128, 128]
+    # L* of 0, 100 and 54, 1.7 fold; 128 is no colour.
+    assert channels[0].tolist() == [[0, 170, 91]]
+    assert (channels[1:] == 128).all()
 
 
 @pytest.mark.parametrize(
