@@ -1,4 +1,4 @@
-"""Compiled Potts lattice for :mod:`sec_lab.segmentation.potts`: couplings and Metropolis sweeps.
+"""Compiled Potts lattice for :mod:`sec_lab.segmentation.lattice`: couplings and Metropolis sweeps.
 
 The picture is taken apart into four planes as on a checkerboard of 2×2 fields: plane 2a + b holds the pixels (2i + a,
 2j + b) at (i + 1, j + 1). No two pixels of a plane are neighbours, so a plane is updated at once, and all neighbours of

@@ -262,6 +262,20 @@ def assign(
             if final[domain] == FRESH and final[other] > 0:
                 final[domain] = 0
 
+    # So is what came up beside it in the same colour: flow is unsure where things move fast.
+    for domain in range(n_domains):
+        if final[domain] != FRESH or origin[domain] != 0:
+            continue
+        least = colour_limit / 2
+        for edge in range(len(sums)):
+            if pairs[edge, 0] != domain and pairs[edge, 1] != domain:
+                continue
+            label = final[pairs[edge, 0] if pairs[edge, 1] == domain else pairs[edge, 1]]
+            if label > 0:
+                distance = _colour_distance(moments[domain], memory[label])
+                if distance < least:
+                    final[domain], least = label, distance
+
     # The others without a label go to the neighbour with the highest mean coupling, from the settled ones outwards.
     best = np.full(n_domains, -1)
     settled = final != 0

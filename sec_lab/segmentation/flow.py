@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sec_lab.codes import as_array, as_integers
-from sec_lab.segmentation.potts import MAX_SPIN, as_picture
+from sec_lab.segmentation.lattice import MAX_SPIN, as_picture
 from sec_lab.segmentation.record import Labels
 
 if TYPE_CHECKING:

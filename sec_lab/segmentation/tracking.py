@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sec_lab.codes import as_integers
 from sec_lab.recording import Recording
 from sec_lab.segmentation.flow import RESIDUAL_LIMIT, dense_inverse_search, grey_flow, reduced_grey
-from sec_lab.segmentation.potts import (
+from sec_lab.segmentation.lattice import (
     LOWEST,
     MAX_SPIN,
     SOFT,
@@ -27,8 +27,8 @@ from sec_lab.segmentation.potts import (
     channel_couplings,
     colour_channels,
     noise_table,
-    superparamagnetic_clustering,
 )
+from sec_lab.segmentation.potts import superparamagnetic_clustering
 from sec_lab.segmentation.record import Labels, Segmentation
 
 EventKind = Literal["new", "lost", "split", "merged", "found"]

@@ -10,11 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sec_lab.segmentation import PottsParameters, superparamagnetic_clustering
+from sec_lab.segmentation import PottsParameters, lattice_energy, relax, superparamagnetic_clustering
 from sec_lab.segmentation._domain_kernels import bond_domains_of, borders_of, domains_of, merge_domains
-from sec_lab.segmentation.potts import (
+from sec_lab.segmentation.lattice import (
     colour_channels,
-    lattice_energy,
     noise_table,
     picture_couplings,
     swept,
@@ -191,6 +190,24 @@ def test_metropolis_alone_leaves_the_picture_in_pieces() -> None:
     assert len(domains_of(spins)[1]) > 100
 
 
+def test_borders_move_to_where_colours_change() -> None:
+    image, truth = four_fields(noise=3)
+    parameters = PottsParameters(alpha=3, colour_space="rgb", relax_sweeps=30)
+    start = np.roll(truth + 1, (1, -1), (0, 1))
+    start[2:20, 100:120] = 0
+    relaxed = relax(image, start, parameters=parameters)
+    assert (start != truth + 1).mean() > 0.03
+    assert (relaxed != truth + 1).mean() < 0.005
+    assert lattice_energy(image, relaxed, parameters=parameters) < lattice_energy(image, start, parameters=parameters)
+
+
+def test_what_is_new_stays_vacant() -> None:
+    image, truth = four_fields(noise=3)
+    start = np.where(truth == 3, 0, truth + 1)
+    relaxed = relax(image, start, parameters=PottsParameters(alpha=3, colour_space="rgb"))
+    assert ((relaxed == 0) == (truth == 3)).mean() > 0.99
+
+
 def test_depth_parts_what_has_one_colour() -> None:
     image = np.full((40, 60, 3), 120, dtype=np.uint8)
     depth = np.full((40, 60), 1.0)
@@ -284,3 +301,9 @@ def test_bad_input(image: NDArray[np.uint8], options: dict[str, object], message
 def test_labels_of_another_size_have_no_energy() -> None:
     with pytest.raises(ValueError, match=r"labels: expected shape \(4, 6\) like the picture, got \(6, 4\)"):
         lattice_energy(IMAGE, np.ones((6, 4), dtype=int))
+
+
+@pytest.mark.parametrize("label", [-1, 32768])
+def test_labels_that_no_lattice_has(label: int) -> None:
+    with pytest.raises(ValueError, match=f"labels: expected 0 to 32767, got {label} to {label}"):
+        relax(IMAGE, np.full((4, 6), label))
