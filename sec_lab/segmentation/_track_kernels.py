@@ -262,17 +262,20 @@ def assign(
             if final[domain] == FRESH and final[other] > 0:
                 final[domain] = 0
 
-    # So is what came up beside it in the same colour: flow is unsure where things move fast.
+    # So is what came up beside it in the same colour: flow is unsure where things move fast. What has just begun to
+    # come in goes on doing so, and first its mixed border is seen.
     for domain in range(n_domains):
         if final[domain] != FRESH or origin[domain] != 0:
             continue
-        least = colour_limit / 2
+        least = 1.0
         for edge in range(len(sums)):
             if pairs[edge, 0] != domain and pairs[edge, 1] != domain:
                 continue
             label = final[pairs[edge, 0] if pairs[edge, 1] == domain else pairs[edge, 1]]
             if label > 0:
-                distance = _colour_distance(moments[domain], memory[label])
+                coming = born[label] > 0 and step - born[label] < young
+                limit = colour_limit if coming else colour_limit / 2
+                distance = _colour_distance(moments[domain], memory[label]) / limit
                 if distance < least:
                     final[domain], least = label, distance
 

@@ -84,6 +84,14 @@ def test_what_comes_in_is_new_and_what_goes_is_lost_and_found() -> None:
     assert [int(image[35, 75]) for image in labels] == [1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 2]
 
 
+def test_what_comes_in_fast_is_one_segment() -> None:
+    boxes: list[list[Box]] = [[]] * 2 + [[(20, 60, 120 - 7 * i, 180, RED)] for i in range(1, 13)]
+    labels, events = followed(movie(boxes))
+    assert told(events) == [("new", (2,))]
+    for i, image in enumerate(labels[2:], 1):
+        assert ((image == 2).sum() / (40 * 7 * i)) == pytest.approx(1, abs=0.12)
+
+
 def test_another_colour_or_place_is_not_found_again() -> None:
     boxes = [[(20, 50, 60, 90, RED)]] + [[]] * 2 + [[(20, 50, 60, 90, BLUE)]] * 2
     assert told(followed(movie(boxes))[1]) == [("lost", (2,)), ("new", (3,))]
