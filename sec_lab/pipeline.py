@@ -270,7 +270,9 @@ def _with_depth_of(
             if frame is None:
                 # The last frames may be corrupt ones that were left out on request.
                 if n_frames is None or number >= n_frames:
-                    raise ValueError(f"masks: expected masks of frames that the recording has, got one of {number}")
+                    raise ValueError(
+                        f"masks: expected masks of frames that the recording has, got one of frame {number}"
+                    )
                 break
         yield number, labels, frame.depth_m if frame is not None and frame.index == number else None
 

@@ -133,7 +133,9 @@ class TestObserve:
         given: list[LabelledFrame] = []
         observe(Recording(read, (16, 32), 4, has_depth=True), segmentation=masks, over_time=remember(given))
         assert [depth is None for _, _, depth in given] == [False, True, False, True]
-        with pytest.raises(ValueError, match="masks: expected masks of frames that the recording has, got one of 3"):
+        with pytest.raises(
+            ValueError, match="masks: expected masks of frames that the recording has, got one of frame 3"
+        ):
             observe(Recording(read, (16, 32), None, has_depth=True), segmentation=masks, over_time=remember([]))
 
     def test_progress_bar(self, capsys: pytest.CaptureFixture[str]) -> None:
