@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sec_lab.event_chain import EventChain
 
 _LEAST_CELL_PX, _MOST_CELL_PX = 5, 26
-_LEAST_NAMED_PX, _LEAST_CODED_PX = 11, 13
+_LEAST_NAMED_PX, _LEAST_CODED_PX, _LEAST_LIT_PX = 11, 13, 15
 
 
 class ChainPanel:
@@ -58,9 +58,10 @@ class ChainPanel:
             self._names = [fitted(name, 0.5 * width_px, size_px=self._name_px) for name in names]
             longest = max(font(self._name_px).getlength(name) for name in self._names)
             self._left += round(longest + 0.6 * self._text_px)
-        room_wide = width_px - self._left - self._margin
+        room_wide = width_px - self._left - self._margin - _LEAST_LIT_PX
         self._n_columns = max(1, min(len(self._frames), room_wide // _LEAST_CELL_PX))
         self._cell_wide = int(np.clip(room_wide // self._n_columns, _LEAST_CELL_PX, _MOST_CELL_PX))
+        self._lit_wide = max(self._cell_wide, _LEAST_LIT_PX)
         self._drawn: tuple[int, NDArray[np.uint8]] | None = None
 
     def at(self, column: int) -> NDArray[np.uint8]:
@@ -86,10 +87,12 @@ class ChainPanel:
                 place = self._left - 0.5 * self._text_px, y + self._cell_high / 2
                 draw.text(place, self._names[row], font=font(self._name_px), fill=INK, anchor="rm")
             for column in range(first, first + self._n_columns):
-                self._draw_cell(draw, row, column, x=self._left + (column - first) * self._cell_wide, lit=lit)
+                x = self._left + (column - first) * self._cell_wide
+                x += (column > lit) * (self._lit_wide - self._cell_wide)
+                self._draw_cell(draw, row, column, x=x, is_lit=column == lit)
         if len(self._codes):
             left = self._left + (lit - first) * self._cell_wide
-            right, bottom = left + self._cell_wide - 1, self._top + len(self._codes) * self._cell_high - 1
+            right, bottom = left + self._lit_wide - 1, self._top + len(self._codes) * self._cell_high - 1
             draw.rectangle((left - 1, self._top - 2, right, bottom + 1), outline=INK, width=2)
             if self._n_hidden:
                 more = f"and {self._n_hidden} more rows"
@@ -97,18 +100,19 @@ class ChainPanel:
         self._explain(draw)
         return image
 
-    def _draw_cell(self, draw: ImageDraw.ImageDraw, row: int, column: int, *, x: int, lit: int) -> None:
+    def _draw_cell(self, draw: ImageDraw.ImageDraw, row: int, column: int, *, x: int, is_lit: bool) -> None:
         relation = Relation(self._codes[row, column])
         colour = rgb(RELATION_COLOUR[relation])
-        if column != lit:
+        wide = self._lit_wide if is_lit else self._cell_wide
+        if not is_lit:
             colour = 1 - 0.45 * (1 - colour)
         y = self._top + row * self._cell_high
         gap = 1 if self._cell_high > _LEAST_CELL_PX else 0
-        box = (x, y, x + self._cell_wide - 1 - gap, y + self._cell_high - 1 - gap)
+        box = (x, y, x + wide - 1 - gap, y + self._cell_high - 1 - gap)
         draw.rectangle(box, fill=tuple((255 * colour).round().astype(int).tolist()))
-        if column == lit and min(self._cell_high, self._cell_wide) >= _LEAST_CODED_PX:
+        if is_lit and self._cell_high >= _LEAST_CODED_PX:
             letters = font(min(self._text_px, 0.62 * self._cell_high))
-            middle = (x + self._cell_wide / 2 - 0.5, y + self._cell_high / 2)
+            middle = (x + wide / 2 - 0.5, y + self._cell_high / 2)
             draw.text(middle, str(int(relation)), font=letters, fill=CODE_COLOUR[relation], anchor="mm")
 
     def _explain(self, draw: ImageDraw.ImageDraw) -> None:
