@@ -41,6 +41,8 @@ _SEGMENTERS = {
     "potts": ("sec_lab.segmentation.tracking", "track_segments"),
 }
 _OVER_TIME = {"steady": ("sec_lab.relations.over_time", "steady_relations")}
+_DISPARITY = ("sec_lab.segmentation.disparity_stream", "DisparityEstimator")
+_DEPTH = ("sec_lab.segmentation.disparity", "depth_from_disparity")
 
 
 def observe(
@@ -246,12 +248,10 @@ def _with_stereo_depth(movie: Recording) -> Recording:
 
 
 def _depth_from_stereo(camera: Calibration) -> DepthOfFrame:
-    disparity = import_module("sec_lab.segmentation.disparity")
-    estimator = disparity.DisparityEstimator()
+    estimator, to_depth = _imported(_DISPARITY)(), _imported(_DEPTH)
 
     def depth_of(frame: Frame) -> NDArray[np.float32]:
-        found = estimator(frame.image, frame.right)
-        return cast("NDArray[np.float32]", disparity.depth_from_disparity(found, camera))
+        return cast("NDArray[np.float32]", to_depth(estimator(frame.image, frame.right), camera))
 
     return depth_of
 
@@ -304,7 +304,11 @@ def _named(method: Any, functions: dict[str, tuple[str, str]], *, what: str) -> 
         return method
     if method not in functions:
         raise ValueError(f"{what}: expected one of {tuple(functions)} or a function, got {method!r}")
-    room, name = functions[method]
+    return _imported(functions[method])
+
+
+def _imported(place: tuple[str, str]) -> Any:
+    room, name = place
     return getattr(import_module(room), name)
 
 

@@ -120,4 +120,8 @@ class _Reading:
 def _read_with_depth(recording: "Recording", start: Callable[[], DepthOfFrame]) -> Iterator[Frame]:
     depth_of = start()
     for frame in recording:
-        yield replace(frame, depth_m=depth_of(frame))
+        try:
+            deep = replace(frame, depth_m=depth_of(frame))
+        except ValueError as error:
+            raise ValueError(f"frame {frame.index}: {error}") from error
+        yield deep

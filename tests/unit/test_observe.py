@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import sec_lab as sl
+from sec_lab import pipeline
 from sec_lab.files import UnusableFileError
 from sec_lab.pipeline import LabelledFrame, observe, segmenter
-from sec_lab.recording import Frame, Recording, write_movie
+from sec_lab.recording import Calibration, Frame, Recording, write_movie
 from sec_lab.recording.sharing import shared, with_depth
 from sec_lab.relations import SegmentRelations, scan_line_relations
 from sec_lab.segmentation import Segmentation
@@ -253,6 +254,68 @@ class TestShared:
         assert recording.has_depth
         for _ in range(2):
             assert [frame.depth_m.max() for frame in recording if frame.depth_m is not None] == [1, 2, 3, 4, 5, 6]
+
+    def test_depth_that_cannot_be_found_is_said_with_its_frame(self) -> None:
+        def start() -> Any:
+            return lambda frame: np.full((1, 1) if frame.index == 4 else (16, 32), 1, dtype=np.float32)
+
+        with pytest.raises(ValueError, match="frame 4: depth: expected 16×32 like the picture"):
+            list(with_depth(Recording.from_frames(pushed()), start))
+
+
+class TestStereo:
+    """Depth from the pictures of two cameras, whatever finds the disparity."""
+
+    @pytest.fixture
+    def found(self, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+        """Numbers of the pairs that were matched, one list for all readings."""
+        pairs: list[int] = []
+
+        class Estimator:
+            def __call__(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
+                pairs.append(int(right[0, 0, 0]))
+                return np.full(left.shape[:2], 1 + right[0, 0, 0], dtype=np.float32)
+
+        def to_depth(disparity: NDArray[np.float32], camera: Calibration) -> NDArray[np.float32]:
+            assert camera.baseline_m is not None
+            return (camera.focal_length_px * camera.baseline_m / disparity).astype(np.float32)
+
+        known = {pipeline._DISPARITY: Estimator, pipeline._DEPTH: to_depth}
+        monkeypatch.setattr(pipeline, "_imported", known.__getitem__)
+        return pairs
+
+    @staticmethod
+    def pair(camera: Calibration | None) -> Recording:
+        right = np.zeros((6, 16, 32, 3), np.uint8)
+        right[:] = np.arange(6)[:, None, None, None]
+        return Recording.from_frames(pushed(), right=right, calibration=camera)
+
+    def test_segmentation_and_relations_get_the_same_depth(self, found: list[int]) -> None:
+        deep: list[float] = []
+
+        def segment(recording: Recording) -> Segmentation:
+            assert recording.has_depth
+
+            def read() -> Iterator[tuple[int, Any]]:
+                for frame, item in zip(recording, by_colour(self.pair(None)).numbered(), strict=True):
+                    assert frame.depth_m is not None
+                    deep.append(float(frame.depth_m.max()))
+                    yield item
+
+            return Segmentation(read, recording.size)
+
+        given: list[LabelledFrame] = []
+        observe(self.pair(Calibration(200, (16, 8), baseline_m=0.3)), segmentation=segment, over_time=remember(given))
+        assert deep == pytest.approx([60, 30, 20, 15, 12, 10])
+        assert [depth.max() for _, _, depth in given if depth is not None] == pytest.approx(deep)
+        assert found == [0, 1, 2, 3, 4, 5], "each pair is matched once"
+
+    @pytest.mark.parametrize("camera", [None, Calibration(200, (16, 8))])
+    def test_without_a_baseline_there_is_no_depth(self, found: list[int], camera: Calibration | None) -> None:
+        given: list[LabelledFrame] = []
+        observe(self.pair(camera), segmentation=by_colour, over_time=remember(given))
+        assert [depth for _, _, depth in given] == [None] * 6
+        assert found == []
 
 
 class TestSpool:
