@@ -45,6 +45,8 @@ class ChainPanel:
         below = round(4.4 * self._text_px)
         rows = chain.changing_rows if chain is not None else np.zeros(0, dtype=np.intp)
         room = height_px - self._top - below
+        if len(rows) * _LEAST_CELL_PX > room:
+            room -= round(1.6 * self._text_px)  # to say how many rows there are more
         self._cell_high = int(np.clip(room // max(1, len(rows)), _LEAST_CELL_PX, min(_MOST_CELL_PX, self._text_px * 2)))
         n_shown = min(len(rows), max(1, room // self._cell_high))
         self._n_hidden = len(rows) - n_shown

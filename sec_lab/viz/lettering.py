@@ -1,5 +1,6 @@
 """Text in pictures that are drawn by the thousand, where matplotlib would be too slow."""
 
+from bisect import bisect_right
 from functools import cache
 
 import numpy as np
@@ -28,9 +29,8 @@ def fitted(text: str, width_px: float, *, size_px: float, bold: bool = False) ->
     letters = font(size_px, bold=bold)
     if letters.getlength(text) <= width_px:
         return text
-    while text and letters.getlength(text + "…") > width_px:
-        text = text[:-1]
-    return text + "…"
+    n = bisect_right(range(1, len(text)), width_px, key=lambda n: letters.getlength(text[:n] + "…"))
+    return text[:n] + "…"
 
 
 def badge(text: str, colour: tuple[int, int, int], *, size_px: float) -> NDArray[np.uint8]:

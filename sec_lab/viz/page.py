@@ -1,7 +1,7 @@
 """What was seen in a movie as one HTML page that needs nothing else: segments, event chain, key frames with graphs."""
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -121,7 +121,7 @@ def _key_frames(
     observation: Observation, segmentation: "Segmentation | None", recording: Recording | None
 ) -> tuple[list[dict[str, Any]], tuple[int, int], str]:
     """Key frames that are shown, the size of their drawings, and what is said of the others."""
-    canvas = _canvas(observation, segmentation)
+    canvas, names = _canvas(observation, segmentation), _short_names(observation)
     recorded = observation.recorded
     graphs = dict(zip(recorded.key_frames.tolist(), recorded.graphs, strict=True))
     numbers = list(graphs)[:_MOST_KEY_FRAMES]
@@ -140,7 +140,7 @@ def _key_frames(
             if n_bytes > _MOST_PICTURES_BYTES:
                 break
         graph = graphs[number]
-        changes = "" if before is None else _changes(before, graph, observation)
+        changes = "" if before is None else _changes(before, graph, names)
         shown.append(
             {
                 "number": number,
@@ -148,7 +148,7 @@ def _key_frames(
                 "picture": picture,
                 "changes": changes,
                 "said": f"Frame {number} with its scene graph",
-                **_graph(graph, observation, canvas),
+                **_graph(graph, names if observation.position_unit == "px" else None, canvas),
             }
         )
         before = graph
@@ -205,13 +205,13 @@ def _data_address(picture: NDArray[np.uint8], canvas: _Canvas) -> str:
     return f"data:image/jpeg;base64,{base64.b64encode(data.tobytes()).decode()}"
 
 
-def _graph(graph: SceneGraph, observation: Observation, canvas: _Canvas) -> dict[str, list[dict[str, Any]]]:
+def _graph(graph: SceneGraph, names: Mapping[int, str] | None, canvas: _Canvas) -> dict[str, list[dict[str, Any]]]:
     """Nodes and edges for the drawing; none without positions in the picture."""
-    if graph.positions is None or observation.position_unit != "px":
+    if graph.positions is None or names is None:
         return {"nodes": [], "edges": []}
     high = np.array([canvas.width - 14, canvas.height - 11])
     places = np.clip(canvas.scale * (graph.positions[:, :2] + 0.5), (14, 11), np.maximum(high, (14, 11)))
-    texts = [_short(observation, label) for label in graph.segments.tolist()]
+    texts = [names[label] for label in graph.segments.tolist()]
     widths = [font(_NODE_PX, bold=True).getlength(text) + 12 for text in texts]
     # Labels that would cover each other move apart, downwards first.
     taken: list[tuple[float, float, float]] = []
@@ -238,20 +238,18 @@ def _graph(graph: SceneGraph, observation: Observation, canvas: _Canvas) -> dict
     return {"nodes": nodes, "edges": edges}
 
 
-def _changes(before: SceneGraph, after: SceneGraph, observation: Observation) -> str:
+def _changes(before: SceneGraph, after: SceneGraph, names: Mapping[int, str]) -> str:
     """What happened at a key frame, in words."""
-    said = []
-    came = sorted(set(after.segments.tolist()) - set(before.segments.tolist()))
-    left = sorted(set(before.segments.tolist()) - set(after.segments.tolist()))
-    said += [f"{_short(observation, label)} comes" for label in came]
-    said += [f"{_short(observation, label)} leaves" for label in left]
-    stay = [label for label in after.segments.tolist() if label not in came]
-    for place, i in enumerate(stay):
-        for j in stay[:place]:
-            relation = after.relation(i, j)
-            if relation != before.relation(i, j):
-                said.append(f"{_short(observation, i)} and {_short(observation, j)}: {_WORDS[relation]}")
-    more = len(said) - _MOST_CHANGES
+    stay, old, new = np.intersect1d(before.segments, after.segments, return_indices=True)
+    differ = before.relations[np.ix_(old, old)] != after.relations[np.ix_(new, new)]
+    pairs = [(int(new[i]), int(new[j])) for i, j in np.argwhere(np.tril(differ)).tolist()]
+    came = np.setdiff1d(after.segments, stay).tolist()
+    left = np.setdiff1d(before.segments, stay).tolist()
+    said = [f"{names[label]} comes" for label in came] + [f"{names[label]} leaves" for label in left]
+    more = len(said) + len(pairs) - _MOST_CHANGES
+    for i, j in pairs[: max(0, _MOST_CHANGES - len(said))]:
+        first, second = (names[int(after.segments[place])] for place in (i, j))
+        said.append(f"{first} and {second}: {_WORDS[Relation(after.relations[i, j])]}")
     return "; ".join(said[:_MOST_CHANGES]) + (f"; and {more} more" if more > 0 else "")
 
 
@@ -263,8 +261,12 @@ _WORDS = {
 }
 
 
-def _short(observation: Observation, label: int) -> str:
-    return fitted(observation.names.get(label) or str(label), 110, size_px=_NODE_PX, bold=True)
+def _short_names(observation: Observation) -> dict[int, str]:
+    """What each segment is called in a drawing."""
+    return {
+        label: fitted(observation.names.get(label) or str(label), 110, size_px=_NODE_PX, bold=True)
+        for label in observation.segments.tolist()
+    }
 
 
 def _css(label: int) -> str:

@@ -12,6 +12,8 @@ from sec_lab.viz.style import segment_colours
 # Of 256: how much of the colour a segment, the background and a border get.
 _TINT, _BACKGROUND_TINT, _BORDER = 92, 20, 215
 _PAPER = 236
+# A segment that covers this much of the picture is what the others lie on.
+_BACKGROUND_SHARE = 0.3
 
 
 def strong_colour(label: int) -> tuple[int, int, int]:
@@ -42,7 +44,8 @@ class Tint:
     segments : iterable of int
         All labels that are to be seen.
     background : int or None
-        Label that gets hardly any colour, and no border.
+        Label that gets hardly any colour, and no border; None: the largest segment of the first picture, if it covers
+        a good part of it.
     border_px : int, optional
         Width of borders.
 
@@ -54,14 +57,19 @@ class Tint:
     """
 
     def __init__(self, segments: Iterable[int], *, background: int | None, border_px: int = 1) -> None:
-        self._background = background
         self._border_px = border_px
         self._colours = np.zeros((1 << 16, 3), dtype=np.uint16)
         for label in segments:
             self._colours[label] = strong_colour(label)
         self._tint = np.full(1 << 16, _TINT, dtype=np.uint16)
+        self._background: int | None = None
+        self._is_begun = False
         if background is not None:
-            self._tint[background] = _BACKGROUND_TINT
+            self._set_background(background)
+
+    def _set_background(self, label: int) -> None:
+        self._background, self._is_begun = label, True
+        self._tint[label] = _BACKGROUND_TINT
 
     def over(self, picture: ArrayLike | None, labels: NDArray[np.integer]) -> NDArray[np.uint8]:
         """Picture with segments drawn in, (height, width, 3) uint8.
@@ -73,6 +81,11 @@ class Tint:
         labels : (height, width) ndarray of int
             Label image.
         """
+        if not self._is_begun:
+            self._is_begun = True
+            areas = np.bincount(labels.ravel())
+            if areas.max() > _BACKGROUND_SHARE * labels.size:
+                self._set_background(int(areas.argmax()))
         share = self._tint[labels]
         share[self._borders(labels)] = _BORDER
         colours = self._colours[labels]
