@@ -39,7 +39,7 @@ class Axis:
 
 
 AXES = (
-    Axis("texture", "texture of the table, share of its brightness", (0, 0.05, 0.1, 0.2, 0.4)),
+    Axis("texture", "texture of the table, share of brightness", (0, 0.05, 0.1, 0.2, 0.4)),
     Axis("contrast", "share of the contrast left", (1, 0.7, 0.5, 0.35, 0.2)),
     Axis("noise_sigma", "noise σ in grey values", (0, 4, 8, 16, 32)),
     Axis("frame_step", "motion, times as fast", (1, 2, 3, 4)),
