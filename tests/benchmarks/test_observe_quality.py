@@ -20,6 +20,7 @@ from sec_lab.event_chain import EventChain
 from sec_lab.observation import Observation
 from sec_lab.pipeline import observe_segments
 from sec_lab.segmentation.quality import quality
+from sec_lab.worlds.drawn import moving_object
 from tests.benchmarks import ours
 from tests.benchmarks.movies import Movie, Source, drawn
 
@@ -112,6 +113,18 @@ def test_observed_movies(
     if benchmark.stats is not None:
         with capsys.disabled():
             print("\n" + table(rows))
+
+
+def test_measuring_is_cheap(benchmark: BenchmarkFixture, capsys: pytest.CaptureFixture[str]) -> None:
+    """On 320×256 pixels; a bench must not spend its time on this."""
+    benchmark.group = "measures of quality, a movie of 320x256"
+    labels = moving_object(1).labels
+    shifted = np.roll(labels, 3, axis=2)
+    found = benchmark(quality, shifted, labels, background=int(np.bincount(labels.ravel()).argmax()))
+    assert 0.8 < found.covering < 1
+    if benchmark.stats is not None:
+        with capsys.disabled():
+            print(f"\nquality: {1000 * benchmark.stats.stats.median / len(labels):.2f} ms a frame")
 
 
 def truth_itself(movie: Movie) -> NDArray[Any]:
