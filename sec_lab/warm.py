@@ -3,7 +3,7 @@
 import numpy as np
 
 from sec_lab.event_chain import EventChain
-from sec_lab.relations import scan_lines
+from sec_lab.relations import scan_lines, steady_relations
 from sec_lab.similarity import compare, pairwise_similarity, permutations
 
 
@@ -16,6 +16,8 @@ def warm() -> None:
     """
     for dtype in (np.uint8, np.uint16):
         scan_lines(np.zeros((1, 8), dtype))
+        seen = np.zeros((1, 8), dtype)
+        list(steady_relations([(0, seen, np.ones(seen.shape)), (1, seen)]))
     chain = EventChain([[0, 2, 0], [0, 0, 2]], [(1, 2), (2, 3)])
     permutations(compare(chain, chain))
     pairwise_similarity([chain, chain])
