@@ -1,6 +1,9 @@
 # Everything runs in .venv, which `setup` builds from requirements.lock once and again only when it has to.
 # make PYTHON=python3.12 chooses the interpreter that .venv is built on.
 PYTHON ?=
+# make bench SEEDS=11,12 MOVIES=8 judges on 8 tabletop movies of each of these seeds, which are rendered first.
+SEEDS ?=
+MOVIES ?=
 BIN := .venv/bin
 PYTEST := $(BIN)/python -m pytest
 NBVAL := --nbval --nbval-current-env --nbval-cell-timeout=300
@@ -35,8 +38,8 @@ test: setup lint types layers  ## run everything that CI runs
 check: setup lint types layers  ## run the quick part of it, for every commit
 	@$(PYTEST) -q -m "not slow" $(wildcard tests/unit)
 
-bench: setup  ## print the speed tables
-	@$(PYTEST) --benchmark-only --benchmark-columns=min,median,max,ops,rounds --benchmark-sort=name tests/benchmarks
+bench: setup  ## print the tables of speed and quality
+	@$(PYTEST) $(if $(SEEDS),--seeds=$(SEEDS)) $(if $(MOVIES),--movies=$(MOVIES)) --benchmark-only --benchmark-columns=min,median,max,ops,rounds --benchmark-sort=name tests/benchmarks
 
 notebooks: setup  ## execute the notebooks in place and store their outputs
 	@$(BIN)/python tests/notebooks/execute.py $(wildcard notebooks/*.ipynb)

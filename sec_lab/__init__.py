@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sec_lab.codes import Relation as Relation
     from sec_lab.event_chain import EventChain as EventChain
     from sec_lab.observation import Observation as Observation
+    from sec_lab.pipeline import observe as observe
     from sec_lab.pipeline import observe_segments as observe_segments
     from sec_lab.recording import Recording as Recording
     from sec_lab.roles import AmbiguousRoleError as AmbiguousRoleError
@@ -42,6 +43,7 @@ _ROOM_OF = {
     "compare": "similarity",
     "corresponding_segments": "roles",
     "main_graphs": "scene_graph",
+    "observe": "pipeline",
     "observe_segments": "pipeline",
     "similarity_table": "similarity",
     "unsupervised_classes": "classification",

@@ -3,6 +3,8 @@
 import errno
 import os
 import secrets
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -90,6 +92,60 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
         raise UnusableFileError(f"{file}: cannot be written, this is a directory") from error
     except (OSError, ValueError) as error:
         raise UnusableFileError(f"{file}: cannot be written ({_reason(error)})") from error
+
+
+@contextmanager
+def written_together(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Several files that are written all or none: each is made beside its place and moved there at the end.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Where the files go; their folders must exist. Existing files are replaced.
+
+    Yields
+    ------
+    list of Path
+        Where to write instead, in the same order and with the same endings. Nothing of it is left if an error leaves
+        the context, interruption included; the error then names the places that were asked for.
+
+    Raises
+    ------
+    UnusableFileError
+        If a folder does not exist, a path is a directory or named twice, or a file cannot be moved to its place.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     places = [Path(folder) / "a.txt", Path(folder) / "b.txt"]
+    ...     with written_together(places) as (a, b):
+    ...         write_whole(a, "1")
+    ...         write_whole(b, "2")
+    ...         before = [place.exists() for place in places]
+    ...     before, [place.exists() for place in places]
+    ([False, False], [True, True])
+    """
+    for place, path in enumerate(paths):
+        if not path.parent.is_dir():
+            raise UnusableFileError(f"{path}: cannot be written, there is no folder {path.parent}")
+        if path.is_dir():
+            raise UnusableFileError(f"{path}: cannot be written, this is a directory")
+        if path.resolve() in [earlier.resolve() for earlier in paths[:place]]:
+            raise UnusableFileError(f"{path}: expected every file once, got it for two things")
+    neighbours = [path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}") for path in paths]
+    try:
+        yield neighbours
+        for neighbour, path in zip(neighbours, paths, strict=True):
+            neighbour.replace(path)
+    except OSError as error:
+        message = str(error)
+        for neighbour, path in zip(neighbours, paths, strict=True):
+            message = message.replace(str(neighbour), str(path))
+        raise UnusableFileError(message) from error
+    finally:
+        for neighbour in neighbours:
+            neighbour.unlink(missing_ok=True)
 
 
 def _replace(file: Path, data: bytes) -> None:

@@ -1,7 +1,7 @@
 """What was seen in one movie: key frames, scene graphs with positions and names, and the event chain of it all."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sec_lab.codes import as_integers
 from sec_lab.event_chain import EventChain, Names, as_names, event_chain
 from sec_lab.scene_graph import MainGraphs, SceneGraph, as_key_frames
+from sec_lab.segmentation import Segmentation
 
 PositionUnit = Literal["px", "m", "unknown"]
 
@@ -29,12 +30,16 @@ class Observation:
         Names of segments; None marks a segment that is known to be no object (a fragment).
     position_unit : {"px", "m", "unknown"}, optional
         Unit of the positions in the graphs: pixels (column, row) or metres.
+    segmentation : Segmentation, optional
+        The label images that the graphs come from; iterating over it reads them anew from wherever they are, or
+        segments the movie again. It is a stream, no content: copies, pickles and files of the observation are without
+        it.
 
     Raises
     ------
     ValueError
         If there is no key frame, the key frames are not as many as the graphs or not ascending, the unit is unknown,
-        or a name is neither text nor None.
+        a name is neither text nor None, or the segmentation is something else.
 
     Examples
     --------
@@ -48,6 +53,7 @@ class Observation:
     key_frames: NDArray[np.int64]
     names: Names
     position_unit: PositionUnit
+    segmentation: Segmentation | None = field(repr=False)
 
     def __init__(
         self,
@@ -55,15 +61,19 @@ class Observation:
         key_frames: ArrayLike,
         names: Names | None = None,
         position_unit: PositionUnit = "unknown",
+        segmentation: Segmentation | None = None,
     ) -> None:
         if not len(graphs):
             raise ValueError("observation: expected at least one key frame, got none")
         if position_unit not in get_args(PositionUnit):
             raise ValueError(f"position_unit: expected one of {get_args(PositionUnit)}, got {position_unit!r}")
+        if not isinstance(segmentation, Segmentation | None):
+            raise ValueError(f"segmentation: expected a Segmentation, got {type(segmentation).__name__}")
         object.__setattr__(self, "graphs", tuple(graphs))
         object.__setattr__(self, "key_frames", as_key_frames(key_frames, n=len(graphs)))
         object.__setattr__(self, "names", as_names(names))
         object.__setattr__(self, "position_unit", position_unit)
+        object.__setattr__(self, "segmentation", segmentation)
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.graphs, self.key_frames, dict(self.names), self.position_unit)
@@ -109,7 +119,7 @@ def without_segments(observation: Observation, segments: Iterable[int]) -> Obser
     """The same observation as if some segments had never been seen.
 
     Key frames at which nothing else changed are no key frames any more (step 3 is applied again); key frames that were
-    not recorded stay.
+    not recorded stay. Label images stay as they are.
 
     Raises
     ------
@@ -136,7 +146,7 @@ def without_segments(observation: Observation, segments: Iterable[int]) -> Obser
             frames.append(frame)
         last = smaller or last
     names = {label: name for label, name in observation.names.items() if label not in dropped}
-    return Observation(graphs, frames, names, observation.position_unit)
+    return Observation(graphs, frames, names, observation.position_unit, observation.segmentation)
 
 
 def without_fragments(observation: Observation) -> Observation:

@@ -3,7 +3,9 @@
 import numpy as np
 
 from sec_lab.event_chain import EventChain
-from sec_lab.relations import scan_lines
+from sec_lab.recording import Recording
+from sec_lab.relations import scan_lines, steady_relations
+from sec_lab.segmentation import lattice_energy, track_segments, warp_labels
 from sec_lab.segmentation.disparity_stream import DisparityEstimator
 from sec_lab.similarity import compare, pairwise_similarity, permutations
 
@@ -17,9 +19,17 @@ def warm() -> None:
     """
     for dtype in (np.uint8, np.uint16):
         scan_lines(np.zeros((1, 8), dtype))
+        seen = np.zeros((1, 8), dtype)
+        list(steady_relations([(0, seen, np.ones(seen.shape)), (1, seen)]))
     estimator, picture = DisparityEstimator(range_px=(0, 15)), np.zeros((32, 48), np.uint8)
     for _ in range(2):
         estimator(picture, picture)
+    movie = np.zeros((4, 8, 8, 3), np.uint8)
+    for _ in track_segments(Recording.from_frames(movie, depth=np.ones(movie.shape[:3]))):
+        pass
+    labels = np.ones((8, 8), np.int64)
+    lattice_energy(movie[0], labels)
+    warp_labels(labels, movie[0], movie[1], np.zeros((4, 4, 2), np.float32))
     chain = EventChain([[0, 2, 0], [0, 0, 2]], [(1, 2), (2, 3)])
     permutations(compare(chain, chain))
     pairwise_similarity([chain, chain])

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,8 @@ from sec_lab.files import UnusableFileError
 if TYPE_CHECKING:
     from av.container import OutputContainer
     from av.video.stream import VideoStream
+
+Preset = Literal["veryfast", "medium", "slow"]
 
 # The same frames give the same bytes anywhere, so nothing of the machine may leave traces in what x264 writes: neither
 # its number of threads nor its instructions. With AVX-512, x264's macroblock tree even differs from run to run.
@@ -31,6 +33,7 @@ def write_movie(
     frames_per_second: float | Fraction,
     crf: float = 18,
     lossless: bool = False,
+    preset: Preset = "medium",
 ) -> None:
     """Write a movie (H.264), whole or not at all.
 
@@ -50,6 +53,8 @@ def write_movie(
     lossless : bool, optional
         Keep every value of every pixel; ``crf`` does not matter then. Such movies are large, and not every player
         shows them.
+    preset : {"veryfast", "medium", "slow"}, optional
+        How much time x264 spends on making the file small.
 
     Raises
     ------
@@ -72,13 +77,15 @@ def write_movie(
     rate = _as_rate(frames_per_second)
     if not 0 <= crf <= 51:
         raise ValueError(f"crf: expected a number from 0 to 51, got {crf}")
+    if preset not in get_args(Preset):
+        raise ValueError(f"preset: expected one of {get_args(Preset)}, got {preset!r}")
     if not file.parent.is_dir():
         raise UnusableFileError(f"{file}: cannot be written, there is no folder {file.parent}")
     if file.is_dir():
         raise UnusableFileError(f"{file}: cannot be written, this is a directory")
     neighbour = file.with_name(f".{file.stem[:50]}-{secrets.token_hex(4)}{file.suffix}")
     try:
-        _encode(neighbour, frames, rate=rate, crf=crf, lossless=lossless)
+        _encode(neighbour, frames, rate=rate, crf=crf, lossless=lossless, preset=preset)
         with neighbour.open("rb+") as stream:
             os.fsync(stream.fileno())
         neighbour.replace(file)
@@ -100,7 +107,9 @@ def _as_rate(frames_per_second: float | Fraction) -> Fraction:
     return rate
 
 
-def _encode(file: Path, frames: Iterable[ArrayLike], *, rate: Fraction, crf: float, lossless: bool) -> None:
+def _encode(
+    file: Path, frames: Iterable[ArrayLike], *, rate: Fraction, crf: float, lossless: bool, preset: Preset
+) -> None:
     import av
 
     with ExitStack() as stack:
@@ -111,7 +120,7 @@ def _encode(file: Path, frames: Iterable[ArrayLike], *, rate: Fraction, crf: flo
             image = _as_picture(values, index, shape)
             shape = image.shape
             if container is None or stream is None:
-                container, stream = _opened(file, image, rate, crf=crf, lossless=lossless)
+                container, stream = _opened(file, image, rate, crf=crf, lossless=lossless, preset=preset)
                 stack.callback(container.close)
             frame = av.VideoFrame.from_ndarray(image, format="rgb24")
             frame.pts = index
@@ -133,7 +142,7 @@ def _as_picture(values: ArrayLike, index: int, shape: tuple[int, ...] | None) ->
 
 
 def _opened(
-    file: Path, image: NDArray[np.uint8], rate: Fraction, *, crf: float, lossless: bool
+    file: Path, image: NDArray[np.uint8], rate: Fraction, *, crf: float, lossless: bool, preset: Preset
 ) -> "tuple[OutputContainer, VideoStream]":
     import av
     from av.video.stream import VideoStream
@@ -146,7 +155,7 @@ def _opened(
         codec, layout, options = "libx264", "yuv420p" if not (height % 2 or width % 2) else "yuv444p", {"crf": str(crf)}
     try:
         container = av.open(str(file.absolute()), "w")
-        stream = container.add_stream(codec, rate=rate, options=options | _SAME_EVERYWHERE)
+        stream = container.add_stream(codec, rate=rate, options={**options, **_SAME_EVERYWHERE, "preset": preset})
     except av.error.FFmpegError:
         raise
     except ValueError as error:

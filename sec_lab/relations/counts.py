@@ -123,7 +123,7 @@ def line_sequences(labels: ArrayLike) -> dict[tuple[int, ...], int]:
     >>> line_sequences([[1, 1, 1], [1, 5, 1], [1, 3, 1]])
     {(1,): 3, (1, 5, 1): 1, (1, 3, 1): 1, (1, 5, 3): 1}
     """
-    image = _as_label_image(labels)
+    image = as_label_image(labels)
     sequences: dict[tuple[int, ...], int] = {}
     for line in (*image.tolist(), *image.T.tolist()):
         sequence = tuple(label for label, _ in groupby(line))
@@ -216,7 +216,7 @@ def scan_lines(labels: ArrayLike) -> ScanLineCounts:
            [0, 0, 1],
            [0, 0, 0]])
     """
-    codes, width, values = _coded(_as_label_image(labels))
+    codes, width, values = coded_image(as_label_image(labels))
     # Imported when it is used: records of relations are read far more often than images are scanned.
     from sec_lab.relations import _kernels
 
@@ -227,7 +227,21 @@ def scan_lines(labels: ArrayLike) -> ScanLineCounts:
     return ScanLineCounts(segments if values is None else values[segments], *hints)
 
 
-def _as_label_image(labels: ArrayLike) -> NDArray[np.integer]:
+def as_label_image(labels: ArrayLike) -> NDArray[np.integer]:
+    """Label image as an array, or one clear error.
+
+    Raises
+    ------
+    ValueError
+        If it is not two-dimensional, empty, not of integers, or a label is negative.
+
+    Examples
+    --------
+    >>> as_label_image([[1, -1]])
+    Traceback (most recent call last):
+    ...
+    ValueError: label image: expected labels from 0 on, got -1
+    """
     image = as_array(labels, what="label image")
     if image.ndim != 2 or not image.size:
         raise ValueError(f"label image: expected shape (height, width), none of them 0, got {image.shape}")
@@ -238,7 +252,7 @@ def _as_label_image(labels: ArrayLike) -> NDArray[np.integer]:
     return image
 
 
-def _coded(image: NDArray[np.integer]) -> tuple["Codes", int, "Integers | None"]:
+def coded_image(image: NDArray[np.integer]) -> tuple["Codes", int, "Integers | None"]:
     """The image as uint8 or uint16, aligned and padded for the kernels; its width; the labels behind the codes."""
     values = None
     largest = int(image.max()) if image.dtype not in (np.uint8, np.uint16) else np.iinfo(image.dtype).max

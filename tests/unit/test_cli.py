@@ -121,7 +121,7 @@ def test_bad_input_is_one_line_and_exit_code_2(files, capsys, arguments, message
     assert sorted(files.iterdir()) == before
 
 
-@pytest.mark.parametrize("command", ["compare", "table", "report"])
+@pytest.mark.parametrize("command", ["observe", "compare", "table", "report"])
 def test_every_command_explains_itself_with_an_example(command, capsys):
     with pytest.raises(SystemExit) as exit_:
         main([command, "--help"])

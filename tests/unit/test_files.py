@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sec_lab.files import UnusableFileError, read_whole, write_whole
+from sec_lab.files import UnusableFileError, read_whole, write_whole, written_together
 
 
 def refused(path: str | Path, reason: str, *, write: bool = False, max_bytes: int = 100) -> None:
@@ -143,3 +143,52 @@ class TestWrite:
             write_whole(file, "new")
         assert file.read_text() == "old"
         assert list(tmp_path.iterdir()) == [file]
+
+
+class TestWrittenTogether:
+    def test_all_take_their_places_at_the_end(self, tmp_path: Path) -> None:
+        places = [tmp_path / "a.mp4", tmp_path / "b.html"]
+        places[1].write_text("old")
+        with written_together(places) as made:
+            assert [path.suffix for path in made] == [".mp4", ".html"]
+            for path in made:
+                path.write_text("new")
+            assert [place.exists() for place in places] == [False, True]
+            assert places[1].read_text() == "old"
+        assert sorted(tmp_path.iterdir()) == places
+        assert [place.read_text() for place in places] == ["new", "new"]
+
+    @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError, UnusableFileError])
+    def test_nothing_is_left_of_an_error(self, tmp_path: Path, error: type[BaseException]) -> None:
+        (tmp_path / "a").write_text("old")
+
+        def fail() -> None:
+            with written_together([tmp_path / "a", tmp_path / "b"]) as made:
+                for path in made:
+                    path.write_text("new")
+                raise error
+
+        with pytest.raises(error):
+            fail()
+        assert sorted(tmp_path.iterdir()) == [tmp_path / "a"]
+        assert (tmp_path / "a").read_text() == "old"
+
+    def test_errors_name_the_places_that_were_asked_for(self, tmp_path: Path) -> None:
+        with (
+            pytest.raises(UnusableFileError, match=r"/a\.mp4: cannot be written"),
+            written_together([tmp_path / "a.mp4"]) as (made,),
+        ):
+            raise UnusableFileError(f"{made}: cannot be written")
+
+    def test_a_file_that_was_not_made_is_an_error(self, tmp_path: Path) -> None:
+        with pytest.raises(UnusableFileError, match="a"), written_together([tmp_path / "a"]):
+            pass
+
+    def test_places_that_cannot_be_used(self, tmp_path: Path) -> None:
+        for paths, reason in (
+            ([tmp_path / "no" / "a"], "there is no folder"),
+            ([tmp_path], "this is a directory"),
+            ([tmp_path / "a", tmp_path / "." / "a"], "expected every file once"),
+        ):
+            with pytest.raises(UnusableFileError, match=reason), written_together(paths):
+                raise AssertionError("entered")

@@ -739,6 +739,7 @@ class TestWriting:
             ([np.zeros((4, 4, 3))], {}, "of type uint8, got (4, 4, 3) of float64"),
             ([], {"frames_per_second": 0}, "frames_per_second: expected a number above 0"),
             ([], {"frames_per_second": float("nan")}, "frames_per_second: expected a number above 0"),
+            ([], {"preset": "hasty"}, "preset: expected one of"),
             ([], {"crf": 60}, "crf: expected a number from 0 to 51, got 60"),
         ],
     )

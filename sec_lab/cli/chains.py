@@ -1,13 +1,12 @@
-"""The command line: ``sec-lab COMMAND …``."""
+"""Commands that compare chains: ``sec-lab compare`` and ``sec-lab table``."""
 
 import argparse
-import io
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, TextIO
+from typing import TYPE_CHECKING
 
+from sec_lab.cli.speaking import Commands, add_command, say
 from sec_lab.files import UnusableFileError
 
 if TYPE_CHECKING:
@@ -15,52 +14,9 @@ if TYPE_CHECKING:
     from sec_lab.similarity import Match
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Those of the command line if left out.
-
-    Returns
-    -------
-    int
-        Exit code: 0, or 1 if a notebook of the report failed, or 2 for bad input, which is explained in one line.
-    """
-    options = _parser().parse_args(arguments)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no ≈ shows something else
-    try:
-        code: int = options.run(options)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # Whoever read the output has left; nobody is there to be told.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except (ValueError, OSError) as error:
-        _say(f"sec-lab {options.command}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        _say(f"sec-lab {options.command}: interrupted", file=sys.stderr)
-        return 130
-    return code
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser that says in one line what is wrong with a call."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message} ({self.prog} --help explains)\n")
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="sec-lab", description="Semantic event chains: compare, classify and understand manipulations."
-    )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-
-    compare = _add_command(
+def add_chain_commands(commands: Commands) -> None:
+    """Add ``compare`` and ``table`` to the command line."""
+    compare = add_command(
         commands,
         "compare",
         "how similar two manipulations are, which rows and which segments correspond",
@@ -71,7 +27,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_similarity_options(compare)
     compare.set_defaults(run=_compare)
 
-    table = _add_command(
+    table = add_command(
         commands,
         "table",
         "the similarities of all pairs of chains, and their unsupervised classes",
@@ -88,29 +44,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_similarity_options(table)
     table.set_defaults(run=_table)
-
-    report = _add_command(
-        commands,
-        "report",
-        "execute the notebooks that changed and write build/report/index.html",
-        "sec-lab report notebooks/chapter2_1_event_chains.ipynb",
-    )
-    report.add_argument("notebooks", type=Path, nargs="*", metavar="NOTEBOOK", help="only these (default: all)")
-    report.add_argument("--force", action="store_true", help="execute them even if nothing changed")
-    report.set_defaults(run=_report)
-    return parser
-
-
-def _add_command(
-    commands: "argparse._SubParsersAction[_Parser]", name: str, what: str, example: str
-) -> argparse.ArgumentParser:
-    return commands.add_parser(
-        name,
-        help=what,
-        description=f"Show {what}." if name != "report" else f"{what.capitalize()}.",
-        epilog=f"example:\n  {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
 
 
 def _add_similarity_options(command: argparse.ArgumentParser) -> None:
@@ -139,9 +72,9 @@ def _compare(options: argparse.Namespace) -> int:
         tolerance_percent=options.tolerance,
     )
     proof = "" if match.exact else "  (at least; the search was cut short)"
-    _say(f"spatial similarity   {match.spatial:6.2f} %")
-    _say(f"temporal similarity  {match.temporal:6.2f} %{proof}")
-    _say("\nrows")
+    say(f"spatial similarity   {match.spatial:6.2f} %")
+    say(f"temporal similarity  {match.temporal:6.2f} %{proof}")
+    say("\nrows")
     row_number = {int(row): i for i, row in enumerate(match.a.changing_rows)}
     column_number = {int(row): j for j, row in enumerate(match.b.changing_rows)}
     lines = [
@@ -150,7 +83,7 @@ def _compare(options: argparse.Namespace) -> int:
     ]
     width = max((len(label) for label, _, _ in lines), default=0)
     for label_a, label_b, similarity in lines:
-        _say(f"  {label_a:<{width}}  ≈  {label_b}  ({similarity:.0f} %)")
+        say(f"  {label_a:<{width}}  ≈  {label_b}  ({similarity:.0f} %)")
     _say_segments(match)
     return 0
 
@@ -163,11 +96,11 @@ def _say_segments(match: "Match") -> None:
     except AmbiguousRoleError as error:
         solved, ambiguous = error.solved, error.ambiguous
 
-    _say("\nsegments")
+    say("\nsegments")
     for a, b in solved.items():
-        _say(f"  {_segment(match.a, a)}  ≈  {_segment(match.b, b)}")
+        say(f"  {_segment(match.a, a)}  ≈  {_segment(match.b, b)}")
     for a, options in ambiguous.items():
-        _say(f"  {_segment(match.a, a)}  ≈  {' or '.join(_segment(match.b, b) for b in options)}  (ambiguous)")
+        say(f"  {_segment(match.a, a)}  ≈  {' or '.join(_segment(match.b, b) for b in options)}  (ambiguous)")
 
 
 def _segment(chain: "EventChain", segment: int) -> str:
@@ -205,11 +138,11 @@ def _table(options: argparse.Namespace) -> int:
         lines = [f"no classes: {error}"]
     if options.output is not None:
         write_whole(options.output, table.round(6).to_csv())
-    _say(table.round(1).to_string())
+    say(table.round(1).to_string())
     if "exact_percent" in table.attrs:
-        _say(f"\n{table.attrs['exact_percent']:.1f} % of the pairs are proven optima")
+        say(f"\n{table.attrs['exact_percent']:.1f} % of the pairs are proven optima")
     for line in lines:
-        _say(line)
+        say(line)
     return 0
 
 
@@ -228,16 +161,6 @@ def _read_comparable(path: Path) -> "EventChain":
     return chain
 
 
-def _report(options: argparse.Namespace) -> int:
-    from sec_lab.report import build_report
-
-    summary = build_report(options.notebooks or None, root=Path.cwd(), force=options.force)
-    for line in summary.errors:
-        _say(line, file=sys.stderr)
-    _say(str(summary.index))
-    return 1 if summary.errors else 0
-
-
 def _short_names(paths: Sequence[Path]) -> list[str]:
     """As few trailing parts of each path as tell all of them apart, without the ending."""
     twice = next((path for i, path in enumerate(paths) if path in paths[:i]), None)
@@ -252,11 +175,3 @@ def _short_names(paths: Sequence[Path]) -> list[str]:
     # Files that all have the same name are told apart by their folders alone.
     last = {path.name for path in paths}
     return [name.rpartition("/")[0] for name in names] if depth > 1 and len(last) == 1 else names
-
-
-def _say(line: str, *, file: TextIO | None = None) -> None:
-    (file or sys.stdout).write(f"{line}\n")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

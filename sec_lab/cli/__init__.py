@@ -1,0 +1,3 @@
+"""The command line: ``sec-lab COMMAND …``."""
+
+from sec_lab.cli.entry import main as main

@@ -1,0 +1,127 @@
+"""One reading of a recording for two readers, and depth that is found while it is read."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sec_lab.recording.record import Frame
+
+if TYPE_CHECKING:
+    from sec_lab.recording.record import Recording
+
+DepthOfFrame = Callable[[Frame], NDArray[np.float32]]
+
+
+def with_depth(recording: "Recording", start: Callable[[], DepthOfFrame]) -> "Recording":
+    """The same recording with depth that is computed from its frames, as they are read.
+
+    Parameters
+    ----------
+    recording : Recording
+    start : callable
+        Called at the beginning of every reading; gives a function from a frame to its depth in metres, shape (height,
+        width), 0 where nothing is known. Frames are given in their order, so it may remember what was before.
+
+    Returns
+    -------
+    Recording
+
+    Examples
+    --------
+    >>> from sec_lab.recording import Recording
+    >>> flat = Recording.from_frames(np.zeros((1, 2, 3, 3), dtype=np.uint8))
+    >>> (frame,) = with_depth(flat, lambda: lambda frame: np.full((2, 3), 1.5, dtype=np.float32))
+    >>> frame.depth_m.max()
+    np.float32(1.5)
+    """
+    return replace(recording, read=partial(_read_with_depth, recording, start), has_depth=True)
+
+
+def shared(recording: "Recording") -> tuple["Recording", Iterator[Frame]]:
+    """A recording, and an iterator over the frames of its first reading.
+
+    Whoever reads the recording first and whoever takes from the iterator get the same frames, each of which is decoded
+    once. Frames that one of both is ahead of the other are kept, so the two should walk side by side. Every further
+    reading begins anew.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    recording : Recording
+    frames : iterator of Frame
+
+    Examples
+    --------
+    >>> from sec_lab.recording import Recording
+    >>> again, beside = shared(Recording.from_frames(np.zeros((2, 2, 3, 3), dtype=np.uint8)))
+    >>> [next(beside) is frame for frame in again]
+    [True, True]
+    """
+    reading = _Reading(recording)
+    return replace(recording, read=reading), reading.beside()
+
+
+class _Reading:
+    """One reading for two readers; ``itertools.tee`` would hold back 57 frames, however close the two are."""
+
+    def __init__(self, recording: "Recording") -> None:
+        self._recording = recording
+        self._source = recording.read()
+        self._is_taken = self._has_left = False
+        self._ahead: deque[Frame] = deque()
+        self._behind: deque[Frame] = deque()
+
+    def __call__(self) -> Iterator[Frame]:
+        if self._is_taken:
+            return self._recording.read()
+        self._is_taken = True
+        return self._leading()
+
+    def _leading(self) -> Iterator[Frame]:
+        try:
+            while True:
+                if self._ahead:
+                    yield self._ahead.popleft()
+                    continue
+                frame = next(self._source, None)
+                if frame is None:
+                    return
+                self._behind.append(frame)
+                yield frame
+        finally:
+            self._has_left = True
+            self._ahead.clear()
+
+    def beside(self) -> Iterator[Frame]:
+        """The frames of the reading that the first reader is given."""
+        while True:
+            if self._behind:
+                yield self._behind.popleft()
+                continue
+            frame = next(self._source, None)
+            if frame is None:
+                return
+            if not self._is_taken:
+                # Nobody may ever read: who comes later begins anew.
+                self._is_taken = self._has_left = True
+            if not self._has_left:
+                self._ahead.append(frame)
+            yield frame
+
+
+def _read_with_depth(recording: "Recording", start: Callable[[], DepthOfFrame]) -> Iterator[Frame]:
+    depth_of = start()
+    for frame in recording:
+        try:
+            deep = replace(frame, depth_m=depth_of(frame))
+        except ValueError as error:
+            raise ValueError(f"frame {frame.index}: {error}") from error
+        yield deep
