@@ -165,7 +165,7 @@ class StereoMovie:
 
     size = 128, 160
     camera = Calibration(190, (80, 64), baseline_m=0.06)
-    start, end = (36.0, 40.0), (84.0, 128.0)
+    start, end = (36.0, 40.0), (84.0, 126.0)
     blue = 84.0, 104.0
 
     def __init__(self) -> None:
@@ -182,7 +182,7 @@ class StereoMovie:
         def way(one: tuple[float, float], other: tuple[float, float], n: int) -> NDArray[np.float64]:
             return np.linspace(one, other, n)
 
-        at_start, at_end = (36.0, 46.0), (84.0, 134.0)
+        at_start, at_end = (36.0, 46.0), (84.0, 132.0)
         for _ in range(12):
             yield self.start, None
         for hand in way((36, 180), at_start, 40):
@@ -194,7 +194,7 @@ class StereoMovie:
             yield tuple(block), tuple(np.array(at_start) + step * np.subtract(at_end, at_start))
         for _ in range(15):
             yield self.end, at_end
-        for hand in (*way(at_end, (36, 134), 18), *way((36, 134), (36, 185), 18)):
+        for hand in (*way(at_end, (36, 132), 18), *way((36, 132), (36, 185), 18)):
             yield self.end, tuple(hand)
         for _ in range(20):
             yield self.end, None
