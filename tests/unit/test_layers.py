@@ -6,7 +6,6 @@ with its arm. What is to be seen where is known, and labels are asked for there.
 
 import dataclasses
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import cv2
 import numba
@@ -17,66 +16,23 @@ from numpy.typing import NDArray
 from sec_lab.recording import Frame, Recording
 from sec_lab.segmentation.layer_parameters import LayerParameters
 from sec_lab.segmentation.layers import layered_segments
-from sec_lab.segmentation.static_scene import rise_above_plane, static_segments
+from tests.drawn_scenes import (
+    BLUE,
+    GREEN,
+    HAND_NUMBER,
+    HEIGHT,
+    RED,
+    TABLE_NUMBER,
+    WIDTH,
+    Block,
+    Moment,
+    Place,
+    drawn,
+    plane,
+)
 
-HEIGHT, WIDTH = 96, 120
-TABLE, SKIN = (172, 150, 122), (206, 120, 98)
-RED, BLUE, GREEN = (190, 40, 36), (40, 70, 180), (50, 150, 60)
 BACKGROUND = 1
-
-Place = tuple[float, float]
 Labels = NDArray[np.uint16]
-
-
-@dataclasses.dataclass(frozen=True)
-class Block:
-    """A box with its middle at (row, column)."""
-
-    place: Place
-    colour: tuple[int, int, int]
-    rows: int = 18
-    columns: int = 18
-
-
-@dataclasses.dataclass(frozen=True)
-class Moment:
-    """What there is in one frame, from the back to the front; the hand by the place of its finger tips."""
-
-    blocks: Sequence[Block] = ()
-    hand: Place | None = None
-    shadow: Place | None = None
-    gain: float = 1.0
-
-
-TABLE_NUMBER, HAND_NUMBER = 0, 100
-
-
-def drawn(moment: Moment, noise: NDArray[np.float64]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Picture and, for every pixel, what is seen: 0 the table, 1, 2, … the blocks, 100 the hand."""
-    fall_off = np.linspace(1.05, 0.9, WIDTH)[None, :, None]
-    picture = np.ones((HEIGHT, WIDTH, 3)) * TABLE
-    if moment.shadow is not None:
-        rows, columns = np.indices((HEIGHT, WIDTH))
-        far = (rows - moment.shadow[0]) ** 2 / 14**2 + (columns - moment.shadow[1]) ** 2 / 20**2
-        picture *= (1 - 0.3 * np.exp(-(far**2)))[..., None]
-    truth = np.zeros((HEIGHT, WIDTH), np.uint8)
-    for number, block in enumerate(moment.blocks, start=1):
-        top, left = round(block.place[0] - block.rows / 2), round(block.place[1] - block.columns / 2)
-        inside = np.s_[max(top, 0) : max(top + block.rows, 0), max(left, 0) : max(left + block.columns, 0)]
-        picture[inside] = block.colour
-        truth[inside] = number
-    if moment.hand is not None:
-        hand = np.zeros((HEIGHT, WIDTH), np.uint8)
-        row, column = (round(value) for value in moment.hand)
-        # Two fingers, the palm and the arm, which reaches to the border of the picture.
-        for shift in (-6, 6):
-            cv2.line(hand, (column + 3, row + shift), (column + 16, row + shift), 1, thickness=6)
-        cv2.ellipse(hand, (column + 20, row), (11, 12), 0, 0, 360, 1, cv2.FILLED)
-        cv2.rectangle(hand, (column + 20, row - 8), (WIDTH + 40, row + 8), 1, cv2.FILLED)
-        picture[hand > 0] = SKIN
-        truth[hand > 0] = HAND_NUMBER
-    picture = cv2.GaussianBlur(picture * fall_off * moment.gain, (3, 3), 0.6)
-    return np.clip(picture + noise, 0, 255).round().astype(np.uint8), truth
 
 
 class Movie:
@@ -410,12 +366,6 @@ class TestReading:
         np.testing.assert_array_equal(found[0], found[1])
 
 
-def plane(*, far_m: float = 1.4, near_m: float = 0.9) -> NDArray[np.float64]:
-    """Depth of a table seen aslant: inverse depth is linear over the rows."""
-    inverse = np.linspace(1 / far_m, 1 / near_m, HEIGHT)[:, None] * np.ones((1, WIDTH))
-    return np.asarray(1 / inverse)
-
-
 class TestDepth:
     block = np.s_[34:62, 46:76]
 
@@ -444,78 +394,3 @@ class TestDepth:
     def test_without_depth_it_is_not(self) -> None:
         image = next(iter(layered_segments(self.recording(depth=False))))
         assert (image[self.block] == BACKGROUND).mean() > 0.9
-
-    def test_rise_is_counted_in_units_of_the_noise(self) -> None:
-        rng = np.random.default_rng(1)
-        inverse = 1 / plane()
-        inverse[self.block] += 0.06
-        inverse += rng.normal(0, 0.01, inverse.shape)
-        depth = (1 / inverse).astype(np.float32)
-        depth[:, :10] = 0
-        rise = rise_above_plane(depth)
-        assert rise.dtype == np.float32
-        assert np.isnan(rise[:, :10]).all()
-        assert np.isfinite(rise[:, 10:]).all()
-        flat = np.isfinite(rise)
-        flat[self.block] = False
-        assert abs(float(np.median(rise[flat]))) < 0.2
-        assert float(rise[flat].std()) == pytest.approx(1, abs=0.15)
-        assert float(np.median(rise[self.block])) == pytest.approx(6, abs=1)
-
-    def test_no_plane(self) -> None:
-        assert np.isnan(rise_above_plane(np.zeros((HEIGHT, WIDTH), np.float32))).all()
-        little = np.zeros((HEIGHT, WIDTH), np.float32)
-        little[:10] = 1
-        assert np.isnan(rise_above_plane(little)).all()
-
-    def test_a_plane_without_noise(self) -> None:
-        rise = rise_above_plane(plane().astype(np.float32))
-        assert np.isfinite(rise).all()
-
-
-class TestStaticSegments:
-    def segments(self, blocks: Sequence[Block], **options: Any) -> NDArray[np.uint8]:
-        picture, _ = drawn(Moment(blocks), np.random.default_rng(5).normal(0, 2, (HEIGHT, WIDTH, 3)))
-        lab = cv2.GaussianBlur(cv2.cvtColor(picture, cv2.COLOR_RGB2LAB), (3, 3), 0.7)
-        return static_segments(np.asarray(lab), **options)
-
-    def test_objects_from_left_to_right(self) -> None:
-        found = self.segments([Block((30, 90), RED), Block((50, 60), GREEN), Block((70, 24), BLUE)])
-        assert (found[70, 24], found[50, 60], found[30, 90]) == (2, 3, 4)
-
-    @pytest.mark.parametrize("side", [10, 18, 40])
-    def test_objects_are_as_large_as_they_are(self, side: int) -> None:
-        found = self.segments([Block((50, 60), RED, side, side)])
-        # Mixed pixels at the rim may belong to either.
-        assert (side - 2) ** 2 <= (found == 2).sum() <= (side + 2) ** 2
-
-    def test_nothing_there(self) -> None:
-        assert (self.segments([]) == 1).all()
-
-    def test_what_is_too_small_is_background(self) -> None:
-        small = Block((50, 60), RED, 10, 10)
-        assert set(np.unique(self.segments([small], least_px=60))) == {1, 2}
-        assert (self.segments([small], least_px=200) == 1).all()
-
-    def test_two_things_joined_by_a_neck(self) -> None:
-        """A red and a blue block, and between them a bridge, half red and half blue."""
-        found = self.segments(
-            [
-                Block((50, 34), RED, 24, 24),
-                Block((50, 76), BLUE, 24, 24),
-                Block((50, 51), RED, 8, 10),
-                Block((50, 60), BLUE, 8, 10),
-            ]
-        )
-        assert set(np.unique(found)) == {1, 2, 3}
-        red, blue = found[40:60, 24:45], found[40:60, 66:87]
-        assert len(np.unique(red)) == len(np.unique(blue)) == 1
-        assert red[0, 0] != blue[0, 0]
-
-    def test_one_thing_with_a_neck_stays_one(self) -> None:
-        found = self.segments([Block((50, 34), RED, 24, 24), Block((50, 76), RED, 24, 24), Block((50, 55), RED, 8, 24)])
-        assert set(np.unique(found)) == {1, 2}
-
-    def test_a_hole_is_filled(self) -> None:
-        found = self.segments([Block((50, 60), RED, 40, 40), Block((50, 60), TABLE, 10, 10)])
-        assert found[50, 60] == found[35, 45] == 2
