@@ -18,7 +18,7 @@ from sec_lab.takes_and_puts import EventAgreement, TakeOrPut, match_events, take
 
 TABLE, HAND, BOX, CAP = 1, 2, 3, 4
 TOP, HEIGHT = 50, 20
-# Motion is measured over 8 frames (TimeParameters.motion_frames): for so long something that was moved seems to move on.
+# Motion is measured over 8 frames (TimeParameters.motion_frames): what was moved seems to move on for so long.
 WITHIN_FRAMES = 8
 
 Picture = NDArray[np.uint8]
