@@ -7,6 +7,7 @@ from sec_lab.recording import Recording
 from sec_lab.relations import scan_lines, steady_relations
 from sec_lab.segmentation import lattice_energy, track_segments, warp_labels
 from sec_lab.segmentation.disparity_stream import DisparityEstimator
+from sec_lab.segmentation.layers import layered_segments
 from sec_lab.similarity import compare, pairwise_similarity, permutations
 
 
@@ -26,6 +27,13 @@ def warm() -> None:
         estimator(picture, picture)
     movie = np.zeros((4, 8, 8, 3), np.uint8)
     for _ in track_segments(Recording.from_frames(movie, depth=np.ones(movie.shape[:3]))):
+        pass
+    # Something comes in from the border, over a block that rests.
+    drawn = np.full((12, 32, 48, 3), (60, 120, 80), np.uint8)
+    drawn[:, 10:22, 16:28] = 200, 40, 30
+    for step, frame in enumerate(drawn[6:]):
+        frame[12:24, 44 - 6 * step :] = 210, 170, 140
+    for _ in layered_segments(Recording.from_frames(drawn)):
         pass
     labels = np.ones((8, 8), np.int64)
     lattice_energy(movie[0], labels)

@@ -1,4 +1,4 @@
-"""Compiled parts of the layered segmentation: costs of labels, relaxation on the lattice, components, bookkeeping.
+"""Compiled parts of the layered segmentation: costs of labels, and relaxation on the lattice.
 
 Images hold *slots*, numbers up to 255 that stand for segments: 0 is unknown, 1 the background. Each kernel runs on one
 thread: they take fractions of a millisecond, less than threads need to meet.
@@ -22,6 +22,9 @@ _LIGHTNESS_STEP = 32.0
 _CHROMA_STEP = 4.0
 # Chroma is compared as it would be at this lightness: shading scales all three.
 _MIDDLE = 150.0
+USUAL = 9.7
+"""Most that the colours of a segment cost it, on the average."""
+
 CAP = np.float32(16.0)
 """Largest cost: no colour is less likely under a label than under uniform noise."""
 
@@ -103,6 +106,17 @@ def colour_costs(counts: Floats, costs: Floats) -> None:
                 value += weight * smooth[other * plane + k]
             density = np.float32(0.97) * value / (total * volume) + np.float32(1.2e-8)
             costs[level * plane + k] = min(-np.log(density) - stretch, CAP)
+    # The many colours of a motley segment are all unlikely: what counts is how usual a colour is for it.
+    typical, weight = np.float32(0), np.float32(0)
+    for i in range(N_BINS):
+        if counts[i] > 0:
+            typical += counts[i] * costs[i]
+            weight += counts[i]
+    excess = typical / weight - np.float32(USUAL)
+    if excess > 0:
+        for i in range(N_BINS):
+            if costs[i] < CAP:
+                costs[i] -= excess
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -292,258 +306,3 @@ def warp(slots: Slots, flow: Floats) -> Slots:
             x2 = x + int(np.rint(2 * flow[fy, fx, 0]))
             warped[y, x] = slots[min(max(y2, 0), height - 1), min(max(x2, 0), width - 1)]
     return warped
-
-
-@nb.njit(cache=True, nogil=True)
-def components(slots: Slots, parts: NDArray[np.int32]) -> int:
-    """Connected parts (8 neighbours) of equal slots, numbered from 0 in the order of their first pixels."""
-    height, width = slots.shape
-    parent = np.empty(height * width // 2 + 2, np.int32)
-    n = 0
-    for y in range(height):
-        for x in range(width):
-            slot = slots[y, x]
-            root = -1
-            if x > 0 and slots[y, x - 1] == slot:
-                root = _root(parent, parts[y, x - 1])
-            if y > 0:
-                for x2 in range(max(0, x - 1), min(width, x + 2)):
-                    if slots[y - 1, x2] == slot:
-                        other = _root(parent, parts[y - 1, x2])
-                        if root < 0:
-                            root = other
-                        elif other != root:
-                            if other < root:
-                                root, other = other, root
-                            parent[other] = root
-            if root < 0:
-                if n == parent.size:
-                    longer = np.empty(2 * n, np.int32)
-                    longer[:n] = parent
-                    parent = longer
-                parent[n] = n
-                root = n
-                n += 1
-            parts[y, x] = root
-    number = np.full(n, -1, np.int32)
-    count = 0
-    for k in range(n):
-        root = _root(parent, k)
-        if number[root] < 0:
-            number[root] = count
-            count += 1
-        number[k] = number[root]
-    for y in range(height):
-        for x in range(width):
-            parts[y, x] = number[parts[y, x]]
-    return count
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def _root(parent: NDArray[np.int32], k: int) -> int:
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
-
-
-@nb.njit(cache=True, nogil=True)
-def describe(
-    parts: NDArray[np.int32], n: int, slots: Slots, unknown_for: NDArray[np.uint8], resting_for: NDArray[np.uint8]
-) -> tuple[Integers, Integers, Integers, Measures, Measures, Measures]:
-    """Slot, area, box (top, left, bottom, right), mean time unknown, mean time at rest, share of inner pixels of parts.
-
-    An inner pixel has its own part two steps away on all four sides.
-    """
-    height, width = parts.shape
-    slot, area = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    box = np.zeros((n, 4), np.int64)
-    box[:, :2] = max(height, width)
-    unknown, resting, inner = np.zeros(n, np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
-    for y in range(height):
-        for x in range(width):
-            k = parts[y, x]
-            slot[k] = slots[y, x]
-            area[k] += 1
-            box[k, 0] = min(box[k, 0], y)
-            box[k, 1] = min(box[k, 1], x)
-            box[k, 2] = max(box[k, 2], y)
-            box[k, 3] = max(box[k, 3], x)
-            unknown[k] += unknown_for[y, x]
-            resting[k] += resting_for[y, x]
-            if (
-                parts[max(y - 2, 0), x] == k
-                and parts[min(y + 2, height - 1), x] == k
-                and parts[y, max(x - 2, 0)] == k
-                and parts[y, min(x + 2, width - 1)] == k
-            ):
-                inner[k] += 1
-    return slot, area, box, unknown / area, resting / area, inner / area
-
-
-@nb.njit(cache=True, nogil=True)
-def surroundings(
-    parts: NDArray[np.int32],
-    question: NDArray[np.int32],
-    n: int,
-    slots: Slots,
-    predicted: Slots,
-    rest: Slots,
-    bins: NDArray[np.uint16],
-    known: NDArray[np.bool_],
-    tables: Floats,
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Of every part in question, over all slots: share around it, share predicted, share at rest below, mean cost.
-
-    Parameters
-    ----------
-    question : (n_parts,) int32
-        Number of the question, -1 for parts that are none.
-    known : (256,) bool
-        Slots whose colours are known.
-    """
-    height, width = parts.shape
-    around, guess, below = (
-        np.zeros((n, 256), np.float32),
-        np.zeros((n, 256), np.float32),
-        np.zeros((n, 256), np.float32),
-    )
-    colour = np.zeros((n, 256), np.float32)
-    which = np.flatnonzero(known)
-    for y in range(height):
-        for x in range(width):
-            k = question[parts[y, x]]
-            if k >= 0:
-                guess[k, predicted[y, x]] += 1
-                below[k, rest[y, x]] += 1
-                for slot in which:
-                    colour[k, slot] += tables[slot, bins[y, x]]
-            # Two steps away: pixels at a rim are mixed.
-            for dy, dx in ((0, 2), (2, 0)):
-                y2, x2 = y + dy, x + dx
-                if y2 < height and x2 < width and parts[y, x] != parts[y2, x2]:
-                    k2 = question[parts[y2, x2]]
-                    if k >= 0:
-                        around[k, slots[y2, x2]] += 1
-                    if k2 >= 0:
-                        around[k2, slots[y, x]] += 1
-    for k in range(n):
-        area = max(guess[k].sum(), np.float32(1))
-        rim = max(around[k].sum(), np.float32(1))
-        around[k] /= rim
-        guess[k] /= area
-        below[k] /= area
-        colour[k] /= area
-    return around, guess, below, colour
-
-
-@nb.njit(cache=True, nogil=True)
-def recolour(parts: NDArray[np.int32], new: NDArray[np.int64], slots: Slots, taught: NDArray[np.uint8]) -> None:
-    """Give parts another slot; below 0: as it is; 256 and more: minus 256, but its colours are not learned."""
-    height, width = parts.shape
-    for y in range(height):
-        for x in range(width):
-            slot = new[parts[y, x]]
-            if slot >= 256:
-                taught[y, x] = 0
-                slots[y, x] = np.uint8(slot - 256)
-            elif slot >= 0:
-                slots[y, x] = np.uint8(slot)
-
-
-@nb.njit(cache=True, nogil=True)
-def settle(
-    image: Lab,
-    before: Lab,
-    found: Slots,
-    slots: Slots,
-    slots_before: Slots,
-    mover: NDArray[np.bool_],
-    any_mover: np.bool_,
-    settle_frames: int,
-    moved_by: int,
-    unknown_for: NDArray[np.uint8],
-    resting_for: NDArray[np.uint8],
-    rest: Slots,
-    seen: Floats,
-    behind: Floats,
-    behind_sigma: Floats,
-    brightest: Floats,
-) -> None:
-    """Count how long pixels have been at rest, and let what rests long enough become part of the static scene."""
-    height, width = slots.shape
-    for y in range(height):
-        for x in range(width):
-            moved = abs(np.int64(image[y, x, 0]) - np.int64(before[y, x, 0])) > moved_by
-            unknown_for[y, x] = min(unknown_for[y, x] + 1, 250) if found[y, x] == UNKNOWN and not moved else 0
-            slot = slots[y, x]
-            resting_for[y, x] = min(resting_for[y, x] + 1, 250) if slot == slots_before[y, x] and not moved else 0
-            if mover[slot] or slot == UNKNOWN or resting_for[y, x] < settle_frames:
-                continue
-            if rest[y, x] != slot:
-                rest[y, x] = slot
-                for c in range(3):
-                    seen[y, x, c] = image[y, x, c]
-                # What settles while a hand is about may lie in its shadow.
-                brightest[y, x] = np.float32(1.45) if any_mover else np.float32(1.05)
-            else:
-                ratio = (np.float32(image[y, x, 0]) + np.float32(16)) / (seen[y, x, 0] + np.float32(16))
-                rate = np.float32(0)
-                if ratio > np.float32(1.05):
-                    rate = np.float32(0.2)
-                elif ratio > np.float32(0.95):
-                    rate = np.float32(0.1)
-                for c in range(3):
-                    seen[y, x, c] += rate * (np.float32(image[y, x, c]) - seen[y, x, c])
-            if slot == BACKGROUND:
-                for c in range(3):
-                    behind[y, x, c] = seen[y, x, c]
-                behind_sigma[y, x] = 0
-
-
-@nb.njit(cache=True, nogil=True)
-def presence(
-    found: Slots, slots: Slots, rest: Slots, mover: NDArray[np.bool_], boxes: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Pixels of every slot, (256, 5), and whether a mover is within two pixels of it; updates boxes of what is visible.
-
-    Columns: at rest, of these recognised, of these covered by a mover; visible, visible elsewhere.
-    """
-    counts = np.zeros((256, 5), np.int64)
-    touched = np.zeros(256, np.bool_)
-    height, width = slots.shape
-    fresh = np.empty((256, 4), np.int64)
-    fresh[:, :2] = max(height, width)
-    fresh[:, 2:] = -1
-    for y in range(height):
-        for x in range(width):
-            resting, slot = rest[y, x], slots[y, x]
-            counts[resting, 0] += 1
-            if found[y, x] == resting:
-                counts[resting, 1] += 1
-            elif mover[slot]:
-                counts[resting, 2] += 1
-            counts[slot, 3] += 1
-            if slot != resting:
-                counts[slot, 4] += 1
-            if slot > BACKGROUND:
-                fresh[slot, 0] = min(fresh[slot, 0], y)
-                fresh[slot, 1] = min(fresh[slot, 1], x)
-                fresh[slot, 2] = max(fresh[slot, 2], y)
-                fresh[slot, 3] = max(fresh[slot, 3], x)
-            if y > 1:
-                other = slots[y - 2, x]
-                if mover[other]:
-                    touched[slot] = True
-                if mover[slot]:
-                    touched[other] = True
-            if x > 1:
-                other = slots[y, x - 2]
-                if mover[other]:
-                    touched[slot] = True
-                if mover[slot]:
-                    touched[other] = True
-    for slot in range(2, 256):
-        if counts[slot, 3] > 0:
-            boxes[slot] = fresh[slot]
-    return counts, touched

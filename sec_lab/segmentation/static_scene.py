@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sec_lab.segmentation.appearance import smoothed_lab
+
 Labels = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
@@ -20,14 +22,14 @@ MAX_OBJECTS = 100
 
 
 def static_segments(
-    lab: NDArray[np.uint8], *, depth_m: NDArray[np.float32] | None = None, least_px: int = 40
+    image: NDArray[np.uint8], *, depth_m: NDArray[np.float32] | None = None, least_px: int = 40
 ) -> Labels:
     """Segments of a picture of a scene at rest.
 
     Parameters
     ----------
-    lab : (height, width, 3) uint8
-        Picture in CIE L*a*b*.
+    image : (height, width, 3) uint8
+        RGB.
     depth_m : (height, width) float32, optional
         Metres; 0 where unknown.
     least_px : int, optional
@@ -40,11 +42,13 @@ def static_segments(
     """
     from sec_lab.segmentation import _layer_kernels as kernels
 
+    lab = smoothed_lab(image)
     bins = kernels.colour_bins(lab)
     unusual = _unusualness(bins)
     rise = None if depth_m is None else rise_above_plane(depth_m)
     seeds = _seeds(unusual, rise, least_px)
-    return _parted(bins, _grown(lab, bins, seeds, rise, least_px), least_px)
+    whole = _parted(bins, _grown(lab, bins, seeds, rise, least_px), least_px)
+    return _coloured(image, bins, whole, least_px)
 
 
 def rise_above_plane(depth_m: NDArray[np.float32]) -> Floats:
@@ -65,7 +69,7 @@ def rise_above_plane(depth_m: NDArray[np.float32]) -> Floats:
     height, width = depth_m.shape
     nothing = np.full((height, width), np.nan, np.float32)
     rows, columns = np.nonzero(depth_m > 0)
-    if len(rows) < 0.2 * height * width:
+    if min(height, width) < 8 or len(rows) < max(100, 0.2 * height * width):
         return nothing
     step = max(1, len(rows) // 12_000)
     x, y = columns[::step] / width - 0.5, rows[::step] / height - 0.5
@@ -130,7 +134,8 @@ def _seeds(unusual: Floats, rise: Floats | None, least_px: int) -> NDArray[np.in
     # Depth from matched windows reaches beyond an object's border, so only what is well inside is certain.
     opened = cv2.morphologyEx(strange.astype(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
     inner = cv2.erode(raised.astype(np.uint8), np.ones((5, 5), np.uint8))
-    certain = np.maximum(inner, cv2.erode(opened, np.ones((3, 3), np.uint8)))
+    # The blur of unusualness reaches out two pixels, and pixels at a rim are mixed.
+    certain = np.maximum(inner, cv2.erode(opened, np.ones((5, 5), np.uint8)))
     _, parts, statistics, _ = cv2.connectedComponentsWithStats(certain, connectivity=4)
     seeds = np.zeros(unusual.shape, np.int32)
     near = cv2.dilate(certain, np.ones((21, 21), np.uint8))
@@ -143,10 +148,10 @@ def _seeds(unusual: Floats, rise: Floats | None, least_px: int) -> NDArray[np.in
         if rise is not None:
             heights = rise[inside]
             known = np.isfinite(heights)
-            if known.mean() > 0.25:
+            if known.mean() > 0.4:
                 if np.median(heights[known]) < 0.75 * _RISES:
                     continue
-            elif np.median(unusual[inside]) < typical + 2.5:
+            elif np.median(unusual[inside]) < typical + 3.0:
                 continue
         number += 1
         seeds[inside] = number
@@ -170,9 +175,15 @@ def _grown(
     tables = np.full((256, kernels.N_BINS), kernels.CAP, np.float32)
     wanted = np.isin(np.arange(256), [BACKGROUND, *objects])
     nothing = np.zeros((height, width), np.uint8)
-    raised = None
+    raised, level, stands = None, None, set[int]()
     if rise is not None:
-        raised = cv2.erode(np.nan_to_num(rise, nan=0.0, posinf=0.0, neginf=0.0), np.ones((7, 7), np.uint8))
+        known = np.nan_to_num(rise, nan=0.0, posinf=0.0, neginf=0.0)
+        raised = cv2.erode(known, np.ones((7, 7), np.uint8))
+        # What stands out by its height ends where the plane is seen.
+        smooth = cv2.dilate(cv2.medianBlur(known, 5), np.ones((3, 3), np.uint8))
+        level = np.minimum(0.25 * np.maximum(_RISES - smooth, 0.0) ** 2, 4).astype(np.float32)
+        level[~np.isfinite(rise)] = 0
+        stands = {int(slot) for slot in objects if np.nanmedian(np.append(rise[seeds == slot], 0)) > 2 * _RISES}
     for _ in range(3):
         counts[:] = 0
         kernels.count_colours(bins, labels, taught, wanted, counts)
@@ -192,6 +203,8 @@ def _grown(
             top, left = max(0, rows - margin), max(0, columns - margin)
             box = np.s_[top : rows + box_height + margin, left : columns + box_width + margin]
             own = cv2.blur(tables[slot][bins[box]], (3, 3))
+            if level is not None and int(slot) in stands:
+                own = own + level[box]
             part = np.ascontiguousarray(labels[box])
             reach = cv2.dilate(inside[box], np.ones((9, 9), np.uint8)) > 0
             core = seeds[box] == slot
@@ -290,3 +303,43 @@ def _differ(bins: NDArray[np.uint16], one: NDArray[np.bool_], other: NDArray[np.
         float((tables[1 - k][bins[where]] - tables[k][bins[where]]).mean()) > 3.0
         for k, where in enumerate((one, other))
     )
+
+
+def _coloured(image: NDArray[np.uint8], bins: NDArray[np.uint16], labels: Labels, least_px: int) -> Labels:
+    """Regions with a large part of another colour in two: what a cup holds. Rims and bands stay."""
+    import cv2
+
+    from sec_lab.segmentation.potts import PottsParameters, superparamagnetic_clustering
+
+    if not (labels > BACKGROUND).any():
+        return labels
+    domains = superparamagnetic_clustering(image, parameters=PottsParameters(minimum_size_px=max(10, least_px)))
+    parted = labels.copy()
+    number = int(labels.max())
+    for slot in np.unique(labels[labels > BACKGROUND]):
+        region = labels == slot
+        area = int(region.sum())
+        least = max(1.5 * least_px, 0.12 * area)
+        sizes = np.bincount(domains[region])
+        for domain in np.flatnonzero(sizes >= least):
+            if number >= MAX_OBJECTS:
+                break
+            part = cv2.morphologyEx((region & (domains == domain)).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3)))
+            n, pieces, statistics, _ = cv2.connectedComponentsWithStats(part, connectivity=4)
+            rest = region & (parted == slot) & (part == 0)
+            if n < 2 or rest.sum() < least:
+                continue
+            piece = pieces == 1 + int(np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
+            if not least <= piece.sum() <= 0.6 * area or not _is_thick(piece) or not _differ(bins, piece, rest):
+                continue
+            number += 1
+            parted[piece] = number
+    return parted
+
+
+def _is_thick(part: NDArray[np.bool_]) -> bool:
+    """Whether a part is more than a rim or a band: its thickness is at least 0.6 of that of a disc of the same area."""
+    import cv2
+
+    thickness = float(cv2.distanceTransform(np.pad(part, 1).astype(np.uint8), cv2.DIST_L2, 5).max())
+    return thickness > 0.6 * float(np.sqrt(part.sum() / np.pi))

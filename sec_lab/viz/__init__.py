@@ -12,9 +12,11 @@ from sec_lab.viz.curves import draw_curves as draw_curves
 from sec_lab.viz.dots import draw_intervals as draw_intervals
 from sec_lab.viz.dots import draw_spread as draw_spread
 from sec_lab.viz.match import draw_match as draw_match
+from sec_lab.viz.moments import draw_moments as draw_moments
 from sec_lab.viz.scene import draw_segments as draw_segments
 from sec_lab.viz.strip import draw_main_graphs as draw_main_graphs
 from sec_lab.viz.style import new_figure as new_figure
 from sec_lab.viz.table import draw_similarity_table as draw_similarity_table
+from sec_lab.viz.timeline import draw_events as draw_events
 from sec_lab.viz.verdicts import Finding as Finding
 from sec_lab.viz.verdicts import verdict_table as verdict_table

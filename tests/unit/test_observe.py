@@ -272,6 +272,9 @@ class TestStereo:
         pairs: list[int] = []
 
         class Estimator:
+            def __init__(self, *, fill: bool) -> None:
+                assert not fill, "what lies in holes is for the segments to say"
+
             def __call__(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
                 pairs.append(int(right[0, 0, 0]))
                 return np.full(left.shape[:2], 1 + right[0, 0, 0], dtype=np.float32)

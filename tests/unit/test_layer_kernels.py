@@ -1,0 +1,301 @@
+"""Kernels of the layered segmentation against plain Python, on small pictures that hypothesis draws."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from sec_lab.segmentation import _layer_kernels as kernels
+from sec_lab.segmentation import _part_kernels
+from tests.naive_layers import (
+    CAP,
+    Settled,
+    naive_cheapest,
+    naive_colour_bins,
+    naive_components,
+    naive_counts,
+    naive_describe,
+    naive_presence,
+    naive_recoloured,
+    naive_relaxed,
+    naive_settled,
+    naive_surroundings,
+    naive_warped,
+)
+
+SIZES = st.tuples(st.integers(1, 9), st.integers(1, 9))
+SEEDS = st.integers(0, 2**32)
+Image = NDArray[np.uint8]
+
+
+def labels(rng: np.random.Generator, size: tuple[int, int], values: list[int]) -> Image:
+    """Slots in patches: each pixel is as the one before it, the one above it, or new."""
+    image = rng.choice(np.array(values, np.uint8), size)
+    for y, x in np.ndindex(*size):
+        draw = rng.random()
+        if x > 0 and draw < 0.4:
+            image[y, x] = image[y, x - 1]
+        elif y > 0 and draw < 0.8:
+            image[y, x] = image[y - 1, x]
+    return image
+
+
+def parts_of(slots: Image) -> tuple[NDArray[np.int32], int]:
+    parts = np.empty(slots.shape, np.int32)
+    return parts, _part_kernels.components(slots, parts)
+
+
+@given(SIZES, SEEDS)
+def test_colour_bins(size: tuple[int, int], seed: int) -> None:
+    lab = np.random.default_rng(seed).integers(0, 256, (*size, 3), np.uint8)
+    np.testing.assert_array_equal(kernels.colour_bins(lab), naive_colour_bins(lab))
+
+
+def test_shading_does_not_change_the_chroma_of_a_bin() -> None:
+    # Half as bright, the distances from grey are half as large: (200 + 16) / 2 - 16 = 92.
+    lit, shaded = np.array([[[200, 152, 104]]], np.uint8), np.array([[[92, 140, 116]]], np.uint8)
+    bins = [int(kernels.colour_bins(lab)[0, 0]) for lab in (lit, shaded)]
+    assert bins[0] % 1600 == bins[1] % 1600
+    assert [k // 1600 for k in bins] == [6, 2]
+
+
+@given(SIZES, SEEDS)
+def test_count_colours(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    bins = rng.integers(0, 4, size).astype(np.uint16)
+    slots, taught = labels(rng, size, [0, 1, 5]), rng.integers(0, 2, size).astype(np.uint8)
+    wanted = np.isin(np.arange(256), [1, 5])
+    counts = np.zeros((256, kernels.N_BINS), np.float32)
+    counts[5, 3] = 7
+    kernels.count_colours(bins, slots, taught, wanted, counts)
+    counts[5, 3] -= 7
+    expected = naive_counts(bins, slots, taught, wanted)
+    assert {tuple(map(int, at)): counts[tuple(at)] for at in np.argwhere(counts)} == expected
+
+
+def test_colour_costs_are_low_where_colours_were_seen() -> None:
+    counts, costs = np.zeros(kernels.N_BINS, np.float32), np.empty(kernels.N_BINS, np.float32)
+    kernels.colour_costs(counts, costs)
+    assert (costs == CAP).all()
+    seen, beside, far = (4 * 40 + 20) * 40 + 20, (4 * 40 + 20) * 40 + 21, (4 * 40 + 30) * 40 + 20
+    counts[seen] = 100
+    kernels.colour_costs(counts, costs)
+    assert costs[seen] < costs[beside] < costs[far] - 5
+    assert costs.max() <= CAP
+    # The same colour in another light is less likely, but not unknown.
+    assert costs[seen] < costs[seen - 1600] < costs[far] - 5
+    assert costs[beside] == costs[beside - 2]
+
+
+@given(SIZES, SEEDS)
+@example((1, 1), 0)
+@example((9, 1), 3)
+def test_components(size: tuple[int, int], seed: int) -> None:
+    slots = labels(np.random.default_rng(seed), size, [0, 1, 2])
+    parts, n = parts_of(slots)
+    expected = naive_components(slots)
+    np.testing.assert_array_equal(parts, expected)
+    assert n == expected.max() + 1
+
+
+def test_components_of_single_pixels() -> None:
+    # As many parts as pixels: no neighbour, not even across a corner, is of the same slot.
+    rows, columns = np.indices((20, 20))
+    slots = (2 * (rows % 2) + columns % 2).astype(np.uint8)
+    parts, n = parts_of(slots)
+    assert n == 400
+    np.testing.assert_array_equal(parts.ravel(), np.arange(400))
+
+
+@given(SIZES, SEEDS)
+def test_describe(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    slots = labels(rng, size, [0, 1, 2])
+    unknown_for, resting_for = rng.integers(0, 251, (2, *size)).astype(np.uint8)
+    parts, n = parts_of(slots)
+    slot, area, box, unknown, resting, inner = _part_kernels.describe(parts, n, slots, unknown_for, resting_for)
+    expected = naive_describe(parts, slots, unknown_for, resting_for)
+    assert slot.tolist() == [part.slot for part in expected]
+    assert area.tolist() == [part.area for part in expected]
+    assert box.tolist() == [list(part.box) for part in expected]
+    for found, name in ((unknown, "unknown"), (resting, "resting"), (inner, "inner")):
+        np.testing.assert_allclose(found, [getattr(part, name) for part in expected], rtol=1e-6, atol=1e-9)
+
+
+def test_a_thin_part_has_no_inner_pixels() -> None:
+    slots = np.ones((12, 20), np.uint8)
+    slots[3, 4:16] = 2
+    slots[6:11, 4:9] = 3
+    parts, n = parts_of(slots)
+    found = _part_kernels.describe(parts, n, slots, slots, slots)
+    inner = dict(zip(found[0].tolist(), found[5].tolist(), strict=True))
+    assert inner[2] == 0
+    assert inner[3] == pytest.approx(1 / 25)  # only the middle of 5×5
+
+
+@given(SIZES, SEEDS)
+def test_surroundings(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    slots, predicted, rest = (labels(rng, size, [0, 1, 2, 255]) for _ in range(3))
+    bins = rng.integers(0, kernels.N_BINS, size).astype(np.uint16)
+    known = np.isin(np.arange(256), [1, 255])
+    tables = rng.uniform(0, 16, (256, kernels.N_BINS)).astype(np.float32)
+    parts, n = parts_of(slots)
+    asked = rng.permutation(n)[: rng.integers(1, n + 1)]
+    question = np.full(n, -1, np.int32)
+    question[asked] = np.arange(len(asked))
+    found = _part_kernels.surroundings(parts, question, len(asked), slots, predicted, rest, bins, known, tables)
+    for k, part in enumerate(asked):
+        expected = naive_surroundings(parts == part, slots, predicted, rest, bins, known, tables)
+        for values, name in zip(found, ("around", "guess", "below", "colour", "fits"), strict=True):
+            np.testing.assert_allclose(values[k], getattr(expected, name), rtol=1e-5, err_msg=name)
+
+
+@given(SIZES, SEEDS)
+def test_recolour(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    slots, taught = labels(rng, size, [0, 1, 2]), rng.integers(0, 2, size).astype(np.uint8)
+    parts, n = parts_of(slots)
+    new = rng.choice([-1, 0, 1, 255, 256, 256 + 255], n)
+    expected = naive_recoloured(parts, new, slots, taught)
+    _part_kernels.recolour(parts, new, slots, taught)
+    np.testing.assert_array_equal(slots, expected[0])
+    np.testing.assert_array_equal(taught, expected[1])
+
+
+@given(SIZES, SEEDS)
+def test_warp(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    slots = labels(rng, size, [0, 1, 2, 3])
+    flow = rng.choice(np.arange(-3, 3.01, 0.25), ((size[0] + 1) // 2, (size[1] + 1) // 2, 2)).astype(np.float32)
+    np.testing.assert_array_equal(kernels.warp(slots, flow), naive_warped(slots, flow))
+
+
+def test_warp_looks_back() -> None:
+    slots = np.arange(40, dtype=np.uint8).reshape(4, 10)
+    flow = np.zeros((2, 5, 2), np.float32)
+    flow[..., 0] = -1.5  # what is seen now was three columns further left
+    assert kernels.warp(slots, flow)[1].tolist() == [10, 10, 10, *range(10, 17)]
+
+
+def costs_of(rng: np.random.Generator, size: tuple[int, int], moving: Image) -> NDArray[np.float32]:
+    """In steps of a quarter, so that many are equal."""
+    return (rng.integers(0, 65, (3 + len(moving), *size)) / 4).astype(np.float32)
+
+
+@given(SIZES, SEEDS, st.sampled_from([[], [2], [7, 2, 255]]))
+def test_cheapest(size: tuple[int, int], seed: int, moving_slots: list[int]) -> None:
+    rng = np.random.default_rng(seed)
+    moving = np.array(moving_slots, np.uint8)
+    costs, rest = costs_of(rng, size, moving), labels(rng, size, [1, 2, 3])
+    slots, sure = np.empty_like(rest), np.empty_like(rest)
+    kernels.cheapest(costs, rest, moving, slots, sure)
+    expected = naive_cheapest(costs, rest, moving)
+    np.testing.assert_array_equal(slots, expected[0])
+    np.testing.assert_array_equal(sure, expected[1])
+
+
+@given(SIZES, SEEDS, st.sampled_from([[], [2], [7, 2, 255]]), st.sampled_from([0, 0.8, 5]))
+def test_relax(size: tuple[int, int], seed: int, moving_slots: list[int], bond: float) -> None:
+    rng = np.random.default_rng(seed)
+    moving = np.array(moving_slots, np.uint8)
+    costs, rest = costs_of(rng, size, moving), labels(rng, size, [1, 2, 3])
+    lab = rng.integers(100, 130, (*size, 3)).astype(np.uint8)
+    slots = labels(rng, size, [0, 1, 2, 3, 7])
+    relaxed = np.empty_like(slots)
+    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(bond))
+    np.testing.assert_array_equal(relaxed, naive_relaxed(costs, lab, rest, moving, slots, bond))
+
+
+def test_bonds_hold_alike_colours_together() -> None:
+    """A single pixel gives in to its neighbours where it looks like them, and not where it does not."""
+    rest, moving = np.ones((3, 3), np.uint8), np.array([2], np.uint8)
+    slots = rest.copy()
+    slots[1, 1] = 2
+    costs = np.full((4, 3, 3), 16, np.float32)
+    costs[0], costs[2] = 5, 3  # for itself it would rather be 2, by 2
+    relaxed = np.empty_like(slots)
+    lab = np.full((3, 3, 3), 128, np.uint8)
+    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(0.8))  # 8 bonds of 0.8
+    assert relaxed[1, 1] == 1
+    lab[1, 1] = 250, 200, 60
+    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(0.8))  # 8 bonds of little more than 0.12
+    assert relaxed[1, 1] == 2
+
+
+@given(SIZES, SEEDS, st.booleans())
+def test_settle(size: tuple[int, int], seed: int, any_mover: bool) -> None:
+    rng = np.random.default_rng(seed)
+    before = rng.integers(90, 160, (*size, 3)).astype(np.uint8)
+    image = np.clip(before + rng.integers(-6, 7, before.shape), 0, 255).astype(np.uint8)
+    found, slots, slots_before, rest = (labels(rng, size, [0, 1, 2, 3]) for _ in range(4))
+    rest = np.maximum(rest, 1)
+    mover = np.arange(256) == 3
+    unknown_for, resting_for = rng.choice([0, 2, 3, 9, 249, 250], (2, *size)).astype(np.uint8)
+    seen, behind = (rng.uniform(90, 160, (2, *size, 3))).astype(np.float32)
+    behind_sigma, brightest = rng.choice([0.0, 4.0], size).astype(np.float32), np.full(size, 1.05, np.float32)
+    state = {
+        pixel: Settled(
+            int(unknown_for[pixel]),
+            int(resting_for[pixel]),
+            int(rest[pixel]),
+            seen[pixel].copy(),
+            behind[pixel].copy(),
+            behind_sigma[pixel],
+            brightest[pixel],
+        )
+        for pixel in np.ndindex(*size)
+    }
+    _part_kernels.settle(
+        image,
+        before,
+        found,
+        slots,
+        slots_before,
+        mover,
+        np.bool_(any_mover),
+        3,
+        4,
+        unknown_for,
+        resting_for,
+        rest,
+        seen,
+        behind,
+        behind_sigma,
+        brightest,
+    )
+    for pixel, known in state.items():
+        expected = naive_settled(
+            known,
+            image[pixel],
+            before[pixel],
+            int(found[pixel]),
+            int(slots[pixel]),
+            int(slots_before[pixel]),
+            is_mover=bool(mover[slots[pixel]]),
+            any_mover=any_mover,
+            settle_frames=3,
+            moved_by=4,
+        )
+        assert (unknown_for[pixel], resting_for[pixel]) == (expected.unknown_for, expected.resting_for)
+        assert (rest[pixel], behind_sigma[pixel]) == (expected.rest, expected.behind_sigma)
+        assert brightest[pixel] == expected.brightest
+        np.testing.assert_array_equal(seen[pixel], expected.seen)
+        np.testing.assert_array_equal(behind[pixel], expected.behind)
+
+
+@given(SIZES, SEEDS)
+def test_presence(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    found, slots, rest = (labels(rng, size, [0, 1, 2, 3, 255]) for _ in range(3))
+    mover = np.isin(np.arange(256), [3, 255])
+    boxes = np.full((256, 4), -1, np.int64)
+    boxes[4] = boxes[2] = 1, 1, 2, 2
+    counts, touched = _part_kernels.presence(found, slots, rest, mover, boxes)
+    expected_counts, expected_touched, expected_boxes = naive_presence(found, slots, rest, mover)
+    np.testing.assert_array_equal(counts, expected_counts)
+    np.testing.assert_array_equal(touched, expected_touched)
+    # What is not to be seen is still known to have been where it was.
+    remembered = {2: (1, 1, 2, 2), 4: (1, 1, 2, 2)} | expected_boxes
+    assert {int(slot): tuple(boxes[slot].tolist()) for slot in np.flatnonzero(boxes[:, 2] >= 0)} == remembered

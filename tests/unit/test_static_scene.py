@@ -1,0 +1,89 @@
+"""What stands on the background of a first picture, by its colour and by its height."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sec_lab.segmentation.static_scene import rise_above_plane, static_segments
+from tests.drawn_scenes import BLUE, GREEN, HEIGHT, RED, TABLE, WIDTH, Block, Moment, drawn, plane
+
+
+class TestRise:
+    block = np.s_[34:62, 46:76]
+
+    def test_rise_is_counted_in_units_of_the_noise(self) -> None:
+        rng = np.random.default_rng(1)
+        inverse = 1 / plane()
+        inverse[self.block] += 0.06
+        inverse += rng.normal(0, 0.01, inverse.shape)
+        depth = (1 / inverse).astype(np.float32)
+        depth[:, :10] = 0
+        rise = rise_above_plane(depth)
+        assert rise.dtype == np.float32
+        assert np.isnan(rise[:, :10]).all()
+        assert np.isfinite(rise[:, 10:]).all()
+        flat = np.isfinite(rise)
+        flat[self.block] = False
+        assert abs(float(np.median(rise[flat]))) < 0.2
+        assert float(rise[flat].std()) == pytest.approx(1, abs=0.15)
+        assert float(np.median(rise[self.block])) == pytest.approx(6, abs=1)
+
+    def test_no_plane(self) -> None:
+        assert np.isnan(rise_above_plane(np.zeros((HEIGHT, WIDTH), np.float32))).all()
+        little = np.zeros((HEIGHT, WIDTH), np.float32)
+        little[:10] = 1
+        assert np.isnan(rise_above_plane(little)).all()
+
+    def test_a_plane_without_noise(self) -> None:
+        rise = rise_above_plane(plane().astype(np.float32))
+        assert np.isfinite(rise).all()
+
+
+class TestStaticSegments:
+    def segments(self, blocks: Sequence[Block], **options: Any) -> NDArray[np.uint8]:
+        picture, _ = drawn(Moment(blocks), np.random.default_rng(5).normal(0, 2, (HEIGHT, WIDTH, 3)))
+        return static_segments(picture, **options)
+
+    def test_objects_from_left_to_right(self) -> None:
+        found = self.segments([Block((30, 90), RED), Block((50, 60), GREEN), Block((70, 24), BLUE)])
+        assert (found[70, 24], found[50, 60], found[30, 90]) == (2, 3, 4)
+
+    @pytest.mark.parametrize("side", [10, 18, 40])
+    def test_objects_are_as_large_as_they_are(self, side: int) -> None:
+        found = self.segments([Block((50, 60), RED, side, side)])
+        # Mixed pixels at the rim may belong to either.
+        assert (side - 2) ** 2 <= (found == 2).sum() <= (side + 2) ** 2
+
+    def test_nothing_there(self) -> None:
+        assert (self.segments([]) == 1).all()
+
+    def test_what_is_too_small_is_background(self) -> None:
+        small = Block((50, 60), RED, 10, 10)
+        assert set(np.unique(self.segments([small], least_px=60))) == {1, 2}
+        assert (self.segments([small], least_px=200) == 1).all()
+
+    def test_two_things_joined_by_a_neck(self) -> None:
+        """A red and a blue block, and between them a bridge, half red and half blue."""
+        found = self.segments(
+            [
+                Block((50, 34), RED, 24, 24),
+                Block((50, 76), BLUE, 24, 24),
+                Block((50, 51), RED, 8, 10),
+                Block((50, 60), BLUE, 8, 10),
+            ]
+        )
+        assert set(np.unique(found)) == {1, 2, 3}
+        red, blue = found[40:60, 24:45], found[40:60, 66:87]
+        assert len(np.unique(red)) == len(np.unique(blue)) == 1
+        assert red[0, 0] != blue[0, 0]
+
+    def test_one_thing_with_a_neck_stays_one(self) -> None:
+        found = self.segments([Block((50, 34), RED, 24, 24), Block((50, 76), RED, 24, 24), Block((50, 55), RED, 8, 24)])
+        assert set(np.unique(found)) == {1, 2}
+
+    def test_a_hole_is_filled(self) -> None:
+        found = self.segments([Block((50, 60), RED, 40, 40), Block((50, 60), TABLE, 10, 10)])
+        assert found[50, 60] == found[35, 45] == 2
