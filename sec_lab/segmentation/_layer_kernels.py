@@ -135,7 +135,8 @@ def _difference(
     sigma = p[3] + np.float32(0.5) * extra + p[4] * off
     d0, d1, d2 = light1 - shade * light0, a1 - shade * a0, b1 - shade * b0
     cost = p[0] + np.float32(0.5) * (d0 * d0 / (sigma_light * sigma_light) + (d1 * d1 + d2 * d2) / (sigma * sigma))
-    cost += np.float32(2) * np.log(sigma / p[3])
+    if sigma > np.float32(1.02) * p[3]:  # most pixels are in no shadow, and logarithms are slow
+        cost += np.float32(2) * np.log(sigma / p[3])
     if shade < np.float32(0.98):
         cost += p[5] * (np.float32(0.98) - shade)
     elif shade > np.float32(1.03):
@@ -250,6 +251,19 @@ def relax(
         for x in range(width):
             own = slots[y, x]
             relaxed[y, x] = own
+            if (
+                0 < y < height - 1
+                and 0 < x < width - 1
+                and slots[y, x - 1] == own
+                and slots[y, x + 1] == own
+                and slots[y - 1, x] == own
+                and slots[y + 1, x] == own
+                and slots[y - 1, x - 1] == own
+                and slots[y - 1, x + 1] == own
+                and slots[y + 1, x - 1] == own
+                and slots[y + 1, x + 1] == own
+            ):
+                continue
             n, alike = 0, True
             for dy in range(-1, 2):
                 for dx in range(-1, 2):

@@ -19,19 +19,23 @@ def components(slots: Slots, parts: NDArray[np.int32]) -> int:
     for y in range(height):
         for x in range(width):
             slot = slots[y, x]
+            # All other neighbours seen so far are neighbours of the one above.
+            if y > 0 and slots[y - 1, x] == slot:
+                parts[y, x] = parts[y - 1, x]
+                continue
             root = -1
             if x > 0 and slots[y, x - 1] == slot:
                 root = _root(parent, parts[y, x - 1])
-            if y > 0:
-                for x2 in range(max(0, x - 1), min(width, x + 2)):
-                    if slots[y - 1, x2] == slot:
-                        other = _root(parent, parts[y - 1, x2])
-                        if root < 0:
-                            root = other
-                        elif other != root:
-                            if other < root:
-                                root, other = other, root
-                            parent[other] = root
+            elif x > 0 and y > 0 and slots[y - 1, x - 1] == slot:
+                root = _root(parent, parts[y - 1, x - 1])
+            if y > 0 and x < width - 1 and slots[y - 1, x + 1] == slot:
+                other = _root(parent, parts[y - 1, x + 1])
+                if root < 0:
+                    root = other
+                elif other != root:
+                    if other < root:
+                        root, other = other, root
+                    parent[other] = root
             if root < 0:
                 if n == parent.size:
                     longer = np.empty(2 * n, np.int32)
