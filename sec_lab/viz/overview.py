@@ -1,6 +1,8 @@
 """A movie turns into an event chain: one picture of steps 1 to 4 (Fig. 2.1).
 
-``python -m sec_lab.viz.overview FILE.png`` draws the first artificial *Moving Object* action.
+``python -m sec_lab.viz.overview FILE.png`` draws the first artificial *Moving Object* action, ``python -m
+sec_lab.viz.overview FILE.png FOLDER 1=table 2=plate …`` what is seen in a stereo movie (``left.mp4``, ``right.mp4``,
+``calibration.json``), with names for its segments.
 """
 
 import sys
@@ -126,18 +128,35 @@ def _draw_time(figure: Figure, n_frames: int, n_key_frames: int) -> None:
 
 def main(arguments: Sequence[str]) -> None:
     """Write the picture to the file that is named."""
+    if not arguments:
+        sys.exit("usage: python -m sec_lab.viz.overview FILE.png [FOLDER [LABEL=NAME ...]]")
+    path, *movie = arguments
+    try:
+        picture = _stereo_movie(Path(movie[0]), movie[1:]) if movie else _drawn_movie()
+        write_whole(Path(path), png_bytes(picture))
+    except ValueError as problem:
+        sys.exit(f"error: {problem}")
+
+
+def _drawn_movie() -> Figure:
     from sec_lab.pipeline import observe_segments
     from sec_lab.worlds.drawn import moving_object
 
-    if len(arguments) != 1:
-        sys.exit("usage: python -m sec_lab.viz.overview FILE.png")
     movie = moving_object(1)
     seen = observe_segments(movie.labels, relations="edge counting", names=_SHORT_NAMES)
-    picture = draw_overview(seen, movie.frames, movie.labels, rows_px=(72, 208))
-    try:
-        write_whole(Path(arguments[0]), png_bytes(picture))
-    except ValueError as problem:
-        sys.exit(f"error: {problem}")
+    return draw_overview(seen, movie.frames, movie.labels, rows_px=(72, 208))
+
+
+def _stereo_movie(folder: Path, names: Sequence[str]) -> Figure:
+    from sec_lab.pipeline import observe
+    from sec_lab.recording import Recording
+
+    named = dict(pair.split("=", 1) for pair in names)
+    movie = Recording.open(folder / "left.mp4", right=folder / "right.mp4", calibration=folder / "calibration.json")
+    seen = observe(movie, names={int(label): name for label, name in named.items()})
+    assert seen.segmentation is not None
+    frames, labels = np.stack([frame.image for frame in movie]), np.stack(list(seen.segmentation))
+    return draw_overview(seen, frames, labels, rows_px=(0, movie.size[0]))
 
 
 if __name__ == "__main__":
