@@ -13,6 +13,7 @@ from sec_lab.viz.dots import draw_intervals as draw_intervals
 from sec_lab.viz.dots import draw_spread as draw_spread
 from sec_lab.viz.gallery import Panel as Panel
 from sec_lab.viz.gallery import draw_gallery as draw_gallery
+from sec_lab.viz.gallery import graph_at as graph_at
 from sec_lab.viz.match import draw_match as draw_match
 from sec_lab.viz.moments import draw_moments as draw_moments
 from sec_lab.viz.roles import RoleStrip as RoleStrip

@@ -9,9 +9,11 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from sec_lab.codes import Relation
+from sec_lab.observation import Observation
 from sec_lab.scene_graph import SceneGraph
 from sec_lab.viz.scene import draw_segments, edge_handles
 from sec_lab.viz.style import INK, PAGE_WIDTH_IN, SMALL_PT, SOFT, TEXT_PT, axes_at, bare, new_figure
+from sec_lab.viz.tint import centres_of
 
 _LETTER_IN, _GAP_IN, _TITLE_IN, _LEGEND_IN = 0.3, 0.1, 0.24, 0.3
 _BAR_IN = 0.75
@@ -106,6 +108,41 @@ def draw_gallery(rows: Sequence[Sequence[Panel]], *, columns: Sequence[str], nam
     if relations:
         _explain(figure, relations)
     return figure
+
+
+def graph_at(observation: Observation, frame: int, labels: ArrayLike) -> SceneGraph:
+    """The scene graph that holds in a frame, its nodes at the centres of the segments there (§2.3).
+
+    Parameters
+    ----------
+    observation : Observation
+    frame : int
+        From the first key frame on.
+    labels : (height, width) array_like of int
+        Label image of the frame. What is not in it stays where it was at the last key frame.
+
+    Raises
+    ------
+    ValueError
+        If the frame is before the first key frame.
+
+    Examples
+    --------
+    >>> seen = Observation([SceneGraph([1, 2], [[0, 2], [2, 0]], [[0.0, 0.0], [9.0, 9.0]])], [4], position_unit="px")
+    >>> graph_at(seen, 6, [[1, 1, 2, 2]]).positions.tolist()
+    [[0.5, 0.0], [2.5, 0.0]]
+    """
+    recorded = observation.recorded
+    place = int(np.searchsorted(recorded.key_frames, frame, side="right")) - 1
+    if place < 0:
+        raise ValueError(f"frame: expected {recorded.key_frames[0]} or later, got {frame}")
+    graph = recorded.graphs[place]
+    if graph.positions is None:
+        return graph
+    centres = centres_of(np.asarray(labels))
+    segments = graph.segments.tolist()
+    positions = [centres.get(segment, before) for segment, before in zip(segments, graph.positions, strict=True)]
+    return SceneGraph(graph.segments, graph.relations, np.array(positions), graph.types)
 
 
 def _draw_panel(ax: Any, panel: Panel, limits: tuple[float, float]) -> None:

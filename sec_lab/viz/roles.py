@@ -1,6 +1,6 @@
 """Segments grouped by their role in an action, as strips of pictures (Fig. 2.8)."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +26,7 @@ from sec_lab.viz.style import (
 )
 
 _WRONG = RELATION_COLOUR[Relation.TOUCHING]
-_TITLE_IN, _HEAD_IN, _CELL_IN, _GAP_IN, _NAME_IN, _FOOT_IN = 0.32, 0.26, 0.6, 0.05, 0.95, 0.26
+_TITLE_IN, _HEAD_IN, _CELL_IN, _GAP_IN, _NAME_IN, _FOOT_IN = 0.28, 0.22, 0.6, 0.05, 0.95, 0.26
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,13 @@ class RoleStrip:
     portraits: Mapping[str, Mapping[int, NDArray[np.uint8]]]
 
 
-def draw_roles(strips: Mapping[str, RoleStrip], *, title: str | None = None, left_out: Collection[str] = ()) -> Figure:
+def draw_roles(
+    strips: Mapping[str, RoleStrip],
+    *,
+    title: str | None = None,
+    left_out: Collection[str] = (),
+    order: Sequence[str] = (),
+) -> Figure:
     """Draw role groups, one row a group and one column a demonstration, strips side by side.
 
     A group is called by the known role of the segment that opened it. A member with another known role has a red frame.
@@ -59,6 +65,8 @@ def draw_roles(strips: Mapping[str, RoleStrip], *, title: str | None = None, lef
     title : str, optional
     left_out : collection of str, optional
         Groups of these roles are not drawn (the background in Fig. 2.8).
+    order : sequence of str, optional
+        Roles in the order in which their groups are drawn; the others come after them.
 
     Raises
     ------
@@ -80,6 +88,10 @@ def draw_roles(strips: Mapping[str, RoleStrip], *, title: str | None = None, lef
         what: [s for s in strip.groups.members if _role(strip, strip.groups.reference, s) not in left_out]
         for what, strip in strips.items()
     }
+    place = {role: number for number, role in enumerate(order)}
+    for what, segments in shown.items():
+        strip = strips[what]
+        segments.sort(key=lambda s: place.get(_role(strip, strip.groups.reference, s), len(place)))
     n_rows = max(map(len, shown.values()))
     if not n_rows:
         raise ValueError("strips: expected at least one group that is not left out, got none")
