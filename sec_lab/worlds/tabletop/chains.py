@@ -107,8 +107,8 @@ def read_chains(folder: Path, *, setting: str) -> StoredChains:
     path = target / QUALITY
     content = read_whole(path, expected="a table of movies")
     try:
-        table = pd.read_csv(io.BytesIO(content), index_col="movie")
-    except (ValueError, UnicodeDecodeError) as error:
+        table = pd.read_csv(io.BytesIO(content)).set_index("movie")
+    except (ValueError, KeyError) as error:
         raise UnusableFileError(f"{path}: expected a table of movies, but it is damaged ({error})") from error
     names = [str(name).rpartition("_")[0] for name in table.index if str(name).endswith(f"_{setting}")]
     if not names:
