@@ -1,6 +1,7 @@
 """What is kept of tabletop movies: observed from pixels and from truth, written and read back."""
 
 import json
+from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 
@@ -63,6 +64,11 @@ def test_what_is_kept_is_what_is_seen(movies: Path) -> None:
         assert dict(stored.names) == dict(anew.names)
         assert list(kept.portraits(source)["moving_object_1"]) == anew.segments.tolist()
     assert dict(kept.quality.loc["moving_object_1"]) == measures(seen)
+    sums = (movies / "chains" / "SHA256SUMS").read_text().splitlines()
+    # Of two movies two chains and two strips each, and the table.
+    assert len(sums) == 9
+    table = sha256((movies / "chains" / "quality.csv").read_bytes()).hexdigest()
+    assert f"{table}  quality.csv" in sums
 
 
 def test_what_is_true_is_told_by_the_same_rules(movies: Path) -> None:

@@ -9,6 +9,7 @@ import io
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ from sec_lab.worlds.tabletop.portraits import Portrait, portrait, read_portraits
 if TYPE_CHECKING:
     import pandas as pd
 
-CHAINS, QUALITY = "chains", "quality.csv"
+CHAINS, QUALITY, SUMS = "chains", "quality.csv", "SHA256SUMS"
 SOURCES = ("pixels", "truth")
 
 
@@ -181,6 +182,14 @@ def _store(folder: Path, *, jobs: int) -> None:
     )
     rows = list(tqdm(done, total=len(movies), unit="movie", disable=not sys.stderr.isatty()))
     write_whole(folder / CHAINS / QUALITY, pd.DataFrame(rows).to_csv(index=False, lineterminator="\n"))
+    write_sums(folder / CHAINS)
+
+
+def write_sums(target: Path) -> None:
+    """Write the sha256 of all files below a folder into one beside them, as ``sha256sum --check`` reads it."""
+    files = sorted(path for path in target.rglob("*") if path.is_file() and path.name != SUMS)
+    lines = [f"{sha256(path.read_bytes()).hexdigest()}  {path.relative_to(target).as_posix()}\n" for path in files]
+    write_whole(target / SUMS, "".join(lines))
 
 
 if __name__ == "__main__":
