@@ -18,7 +18,7 @@ export JUPYTER_PREFER_ENV_PATH := 1
 unexport MPLBACKEND
 
 .DEFAULT_GOAL := help
-.PHONY: help setup report lab test check bench notebooks lint types layers clean
+.PHONY: help setup report lab test check bench notebooks chains lint types layers clean
 
 help:  ## list what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -43,6 +43,10 @@ bench: setup  ## print the tables of speed and quality
 
 notebooks: setup  ## execute the notebooks in place and store their outputs
 	@$(BIN)/python tests/notebooks/execute.py $(wildcard notebooks/*.ipynb)
+
+chains: setup  ## observe the tabletop movies again, keep their chains, and execute the notebook that shows them
+	@$(BIN)/python -m sec_lab.worlds.tabletop.chains datasets/tabletop_actions --jobs 2
+	@$(BIN)/python tests/notebooks/execute.py notebooks/chapter2_2_real_actions.ipynb
 
 lint:
 	@$(BIN)/ruff check .

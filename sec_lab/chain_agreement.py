@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from sec_lab.event_chain import EventChain
 from sec_lab.observation import Observation
 from sec_lab.similarity import EFFORT, Normalizer, compare
@@ -77,6 +79,18 @@ def chain_agreement(
         for x, y in ((b, a), (a, b))
     )
     return ChainAgreement(found_again, to_the_point)
+
+
+def same_chain(a: EventChain, b: EventChain) -> bool:
+    """Whether two chains say the same of the same segments at the same frames; names may differ.
+
+    Examples
+    --------
+    >>> one, other = EventChain([[0, 2]], [(1, 2)], [4, 9]), EventChain([[0, 2]], [(1, 2)], [4, 8])
+    >>> same_chain(one, one), same_chain(one, other)
+    (True, False)
+    """
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("relations", "pairs", "key_frames"))
 
 
 def _chain_of(seen: EventChain | Observation) -> EventChain | None:

@@ -11,8 +11,13 @@ from sec_lab.viz.counts import draw_counts as draw_counts
 from sec_lab.viz.curves import draw_curves as draw_curves
 from sec_lab.viz.dots import draw_intervals as draw_intervals
 from sec_lab.viz.dots import draw_spread as draw_spread
+from sec_lab.viz.gallery import Panel as Panel
+from sec_lab.viz.gallery import draw_gallery as draw_gallery
+from sec_lab.viz.gallery import graph_at as graph_at
 from sec_lab.viz.match import draw_match as draw_match
 from sec_lab.viz.moments import draw_moments as draw_moments
+from sec_lab.viz.roles import RoleStrip as RoleStrip
+from sec_lab.viz.roles import draw_roles as draw_roles
 from sec_lab.viz.scene import draw_segments as draw_segments
 from sec_lab.viz.strip import draw_main_graphs as draw_main_graphs
 from sec_lab.viz.style import new_figure as new_figure
