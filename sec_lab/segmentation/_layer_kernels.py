@@ -22,9 +22,6 @@ _LIGHTNESS_STEP = 32.0
 _CHROMA_STEP = 4.0
 # Chroma is compared as it would be at this lightness: shading scales all three.
 _MIDDLE = 150.0
-USUAL = 9.7
-"""Most that the colours of a segment cost it, on the average."""
-
 CAP = np.float32(16.0)
 """Largest cost: no colour is less likely under a label than under uniform noise."""
 
@@ -106,17 +103,6 @@ def colour_costs(counts: Floats, costs: Floats) -> None:
                 value += weight * smooth[other * plane + k]
             density = np.float32(0.97) * value / (total * volume) + np.float32(1.2e-8)
             costs[level * plane + k] = min(-np.log(density) - stretch, CAP)
-    # The many colours of a motley segment are all unlikely: what counts is how usual a colour is for it.
-    typical, weight = np.float32(0), np.float32(0)
-    for i in range(N_BINS):
-        if counts[i] > 0:
-            typical += counts[i] * costs[i]
-            weight += counts[i]
-    excess = typical / weight - np.float32(USUAL)
-    if excess > 0:
-        for i in range(N_BINS):
-            if costs[i] < CAP:
-                costs[i] -= excess
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
