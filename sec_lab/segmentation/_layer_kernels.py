@@ -171,6 +171,9 @@ def label_costs(
             colour = bins[y, x]
             for k in range(n):
                 place = (near[y, x] >> np.uint32(2 * k)) & np.uint32(3)
+                if place == 0 and far[k] >= CAP:
+                    costs[2 + k, y, x] = CAP
+                    continue
                 cost = tables[moving[k], colour] + extra[k]
                 if place == 0:
                     cost += far[k]
@@ -227,16 +230,29 @@ def _cost_of(slot: int, costs: Floats, rest: int, moving: NDArray[np.uint8], y: 
 
 @nb.njit(cache=True, nogil=True)
 def relax(
-    costs: Floats, image: Lab, rest: Slots, moving: NDArray[np.uint8], slots: Slots, relaxed: Slots, bond: float
+    costs: Floats,
+    image: Lab,
+    rest: Slots,
+    moving: NDArray[np.uint8],
+    slots: Slots,
+    relaxed: Slots,
+    bond: float,
+    awake: NDArray[np.bool_],
 ) -> None:
-    """One sweep at temperature zero over the lattice of 8 neighbours: spins with a field (costs) and bonds (colour)."""
+    """One sweep at temperature zero over the lattice of 8 neighbours: spins with a field (costs) and bonds (colour).
+
+    Only pixels that are ``awake``, (height, width) bool, may change. Afterwards those are awake that have changed or
+    have a neighbour that has: the next sweep can change no other.
+    """
     height, width = slots.shape
+    weights = np.empty(8, np.float32)
+    around = np.empty(8, np.uint8)
     for y in range(height):
-        weights = np.empty(8, np.float32)
-        around = np.empty(8, np.uint8)
         for x in range(width):
             own = slots[y, x]
             relaxed[y, x] = own
+            if not awake[y, x]:
+                continue
             if (
                 0 < y < height - 1
                 and 0 < x < width - 1
@@ -291,6 +307,11 @@ def relax(
                 if cost < best - np.float32(1e-4):
                     best = cost
                     relaxed[y, x] = candidate
+    awake[:] = False
+    for y in range(height):
+        for x in range(width):
+            if relaxed[y, x] != slots[y, x]:
+                awake[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2] = True
 
 
 @nb.njit(cache=True, nogil=True)

@@ -70,6 +70,7 @@ class Layers:
         self._known = np.zeros(256, dtype=np.bool_)
         self._counts = np.zeros((256, kernels.N_BINS), np.float32)
         self._anchors = np.zeros((256, kernels.N_BINS), np.float32)
+        self._anchored = np.zeros(256, dtype=np.bool_)
         self._tables = np.full((256, kernels.N_BINS), kernels.CAP, np.float32)
         self._boxes = np.full((256, 4), -1, np.int64)
         self._born = np.zeros(256, np.int64)
@@ -107,8 +108,9 @@ class Layers:
         found, relaxed = np.empty_like(self.slots), np.empty_like(self.slots)
         taught = np.empty_like(self.slots)
         kernels.cheapest(costs, self.rest, moving, found, taught)
+        awake = np.ones(self._size, np.bool_)
         for _ in range(p.sweeps):
-            kernels.relax(costs, lab, self.rest, moving, found, relaxed, np.float32(p.bond))
+            kernels.relax(costs, lab, self.rest, moving, found, relaxed, np.float32(p.bond), awake)
             found, relaxed = relaxed, found
         slots = found.copy()
         self._judge(slots, taught, predicted, bins)
@@ -417,7 +419,7 @@ class Layers:
         from sec_lab.segmentation import _layer_kernels as kernels
 
         self.labels[slot] = 0
-        self._known[slot] = self.mover[slot] = self._moving[slot] = False
+        self._known[slot] = self.mover[slot] = self._moving[slot] = self._anchored[slot] = False
         self._hidden[slot] = self._missing[slot] = self._touched[slot] = False
         self._counts[slot] = self._anchors[slot] = 0
         self._tables[slot] = kernels.CAP
@@ -438,10 +440,11 @@ class Layers:
             return
         there = wanted & (np.bincount(self.slots.ravel(), minlength=256) > 30)
         # What a segment looked like at first is never forgotten: it may be carried through a shadow.
-        first = there & (self._anchors.sum(axis=1) == 0) & ~self.mover
+        first = there & ~self._anchored & ~self.mover
         self._counts[there] = np.maximum(self._counts[there] * np.float32(self._p.memory), self._anchors[there])
         kernels.count_colours(bins, self.slots, taught, there, self._counts)
         self._anchors[first] = self._counts[first]
+        self._anchored[first] = self._counts[first].any(axis=1)
         for slot in np.flatnonzero(there):
             kernels.colour_costs(self._counts[slot], self._tables[slot])
 

@@ -217,6 +217,7 @@ def _grown(
             spins = np.where(costs[1] < costs[2], 1, 0).astype(np.uint8)
             spins[~free] = 0
             relaxed = np.empty_like(spins)
+            awake = np.ones_like(spins, np.bool_)
             for _sweep in range(6):
                 kernels.relax(
                     costs,
@@ -226,6 +227,7 @@ def _grown(
                     spins,
                     relaxed,
                     np.float32(1.2),
+                    awake,
                 )
                 spins, relaxed = relaxed, spins
             object_ = cv2.morphologyEx(spins, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))

@@ -203,9 +203,22 @@ def test_relax(size: tuple[int, int], seed: int, moving_slots: list[int], bond: 
     costs, rest = costs_of(rng, size, moving), labels(rng, size, [1, 2, 3])
     lab = rng.integers(100, 130, (*size, 3)).astype(np.uint8)
     slots = labels(rng, size, [0, 1, 2, 3, 7])
-    relaxed = np.empty_like(slots)
-    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(bond))
-    np.testing.assert_array_equal(relaxed, naive_relaxed(costs, lab, rest, moving, slots, bond))
+    relaxed, awake = np.empty_like(slots), np.ones(size, np.bool_)
+    for _sweep in range(4):
+        kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(bond), awake)
+        np.testing.assert_array_equal(relaxed, naive_relaxed(costs, lab, rest, moving, slots, bond))
+        slots, relaxed = relaxed.copy(), slots
+
+
+def test_pixels_that_sleep_do_not_relax() -> None:
+    rest, moving = np.ones((1, 7), np.uint8), np.array([2], np.uint8)
+    slots = np.array([[1, 2, 2, 2, 2, 2, 2]], np.uint8)
+    costs = np.full((4, 1, 7), 16, np.float32)
+    costs[0] = 0
+    relaxed, awake = np.empty_like(slots), np.array([[0, 1, 0, 0, 0, 0, 0]], np.bool_)
+    kernels.relax(costs, np.zeros((1, 7, 3), np.uint8), rest, moving, slots, relaxed, np.float32(0.8), awake)
+    assert relaxed.tolist() == [[1, 1, 2, 2, 2, 2, 2]]
+    assert awake.tolist() == [[True, True, True, False, False, False, False]]
 
 
 def test_bonds_hold_alike_colours_together() -> None:
@@ -217,10 +230,12 @@ def test_bonds_hold_alike_colours_together() -> None:
     costs[0], costs[2] = 5, 3  # for itself it would rather be 2, by 2
     relaxed = np.empty_like(slots)
     lab = np.full((3, 3, 3), 128, np.uint8)
-    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(0.8))  # 8 bonds of 0.8
+    awake = np.ones(slots.shape, np.bool_)
+    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(0.8), awake)  # 8 bonds of 0.8
     assert relaxed[1, 1] == 1
     lab[1, 1] = 250, 200, 60
-    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(0.8))  # 8 bonds of little more than 0.12
+    awake[:] = True
+    kernels.relax(costs, lab, rest, moving, slots, relaxed, np.float32(0.8), awake)  # 8 bonds of little more than 0.12
     assert relaxed[1, 1] == 2
 
 
