@@ -1,0 +1,238 @@
+"""Which segment a part of the picture belongs to that is small, unknown or left behind (``layers.py``)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sec_lab.segmentation.known_segments import N_SLOTS, KnownSegments, Slots
+from sec_lab.segmentation.layer_parameters import LayerParameters
+
+UNTAUGHT = 256
+"""Added to a slot: a part belongs to it, but its colours are not learned."""
+
+_PAUSE_FRAMES = 3
+"""A mover that rests for so long makes a pause; its parts that rest are not left behind."""
+
+# Shares of the rim of a part that borders on a segment, and of its area where a segment was expected.
+_HARDLY_BESIDE, _BESIDE, _LARGELY_BESIDE = 0.03, 0.1, 0.25
+_EXPECTED = 0.2
+
+# In the unit of costs, nats per pixel (see LayerParameters).
+_OUT_OF_PLACE = 6.0
+"""Of a part that a segment neither borders on nor was expected at; less, the more it does."""
+_ELSEWHERE, _COME_TO_LIGHT = 4.0, 2.0
+"""Of a part away from its segment, by colour alone; and if the segment was hidden."""
+_LACKING = 2.5
+"""By so much colours may fit worse if most of a segment is missing right here: it is in another light."""
+_SURELY = 1.0
+"""By so much colours must fit better where nothing but colour speaks for a segment."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The connected parts of a picture.
+
+    Parameters
+    ----------
+    where : (height, width) int32
+        Number of the part of every pixel.
+    slot, area : (n,) int64
+    box : (n, 4) int64
+        Top, left, bottom, right.
+    unknown_for, resting_for : (n,) float
+        Mean time unknown and at rest, in frames.
+    inner_share : (n,) float
+        Share of pixels more than two away from the border.
+    at_border : (n,) bool
+        It reaches the border of the picture.
+    """
+
+    where: NDArray[np.int32]
+    slot: NDArray[np.int64]
+    area: NDArray[np.int64]
+    box: NDArray[np.int64]
+    unknown_for: NDArray[np.float64]
+    resting_for: NDArray[np.float64]
+    inner_share: NDArray[np.float64]
+    at_border: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Questions:
+    """Which parts are in question, (n,) bool each.
+
+    Parameters
+    ----------
+    small : of fewer pixels than may stand for themselves
+    doubtful : unknown, or small beside the rest of its segment
+    remnant : what a segment has left behind where it lay: its shadow, a rim
+    gone : of a mover that has left the picture, of which nothing can remain
+    left : at rest inside the picture while the mover it was taken for goes on
+    """
+
+    small: NDArray[np.bool_]
+    doubtful: NDArray[np.bool_]
+    remnant: NDArray[np.bool_]
+    gone: NDArray[np.bool_]
+    left: NDArray[np.bool_]
+
+    @property
+    def asked(self) -> NDArray[np.int64]:
+        """Numbers of the parts in question."""
+        return np.flatnonzero(self.doubtful | self.left | self.remnant)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part in question and what is around it; the arrays have an entry for every slot."""
+
+    slot: int
+    area: int
+    box: NDArray[np.int64]
+    border: bool
+    thick: bool
+    unknown_for: float
+    around: NDArray[np.float32]
+    guess: NDArray[np.float32]
+    below: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    fits: NDArray[np.float32]
+
+
+def parts_of(slots: Slots, unknown_for: Slots, resting_for: Slots) -> Parts:
+    """Connected parts of equal slots, 8 neighbours; images (height, width) uint8, times in frames."""
+    from sec_lab.segmentation import _part_kernels
+
+    height, width = slots.shape
+    where = np.empty((height, width), np.int32)
+    n = _part_kernels.components(slots, where)
+    slot, area, box, unknown, resting, inner = _part_kernels.describe(where, n, slots, unknown_for, resting_for)
+    border = (box[:, 0] == 0) | (box[:, 1] == 0) | (box[:, 2] == height - 1) | (box[:, 3] == width - 1)
+    return Parts(where, slot, area, box, unknown, resting, inner, border)
+
+
+def questions_about(parts: Parts, segments: KnownSegments, parameters: LayerParameters, *, least_px: int) -> Questions:
+    """Parts that may belong to another segment than the lattice has found."""
+    slot, area = parts.slot, parts.area
+    largest = np.zeros(N_SLOTS, np.int64)
+    np.maximum.at(largest, slot, area)
+    small = area < least_px
+    doubtful = (slot == 0) | (small & (area < largest[slot])) | (area < 6)
+    rests = parts.resting_for >= parameters.wait_frames
+    remnant = (slot > 1) & ~segments.mover[slot] & rests
+    crumb = (area < 0.1 * segments.most_px[slot]) & ~segments.touched[slot]
+    remnant &= (area < np.where(segments.moving[slot], 1, 0.3) * largest[slot]) | crumb
+    enters = np.zeros(N_SLOTS, dtype=np.bool_)
+    enters[slot[parts.at_border]] = True
+    gone = segments.mover[slot] & ~enters[slot] & (largest[slot] < 0.2 * segments.most_px[slot])
+    doubtful |= small & gone
+    # While a mover pauses, its fingers may seem to be parts of their own.
+    pause = np.zeros(N_SLOTS, np.float64)
+    main = area == largest[slot]
+    pause[slot[main]] = parts.resting_for[main]
+    goes_on = pause[slot] < _PAUSE_FRAMES
+    left = segments.mover[slot] & ~small & ~parts.at_border & ((rests & goes_on & (area < largest[slot])) | gone)
+    return Questions(small, doubtful, remnant, gone, left)
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Gives a part in question a slot, by what is known of the segments and of the last frame.
+
+    Parameters
+    ----------
+    segments : KnownSegments
+        A new segment is added to them where one is needed.
+    slots, rest : (height, width) uint8
+        Of the last frame, and of what rests.
+    visit : int
+        Last step without a mover in the picture.
+    parameters : LayerParameters
+    new_px : int
+        Smallest new segment inside the picture.
+    """
+
+    segments: KnownSegments
+    slots: Slots
+    rest: Slots
+    visit: int
+    parameters: LayerParameters
+    new_px: int
+
+    def unknown(self, part: Part) -> int:
+        """Slot of a part that no layer explains; with UNTAUGHT added if its colours shall not be learned."""
+        p, segments = self.parameters, self.segments
+        # Where a segment has gone away, what it lay on comes to light.
+        gone = segments.moving & ~segments.mover & (part.around < 0.2)
+        if part.below[gone].sum() > 0.5 and part.colour[1] < p.fitting_cost + 0.5:
+            return UNTAUGHT + 1
+        if self._is_ground(part):
+            return UNTAUGHT + 1
+        best, least, fits = 0, np.inf, False
+        for slot in np.flatnonzero(
+            (part.around > _HARDLY_BESIDE) | (part.guess > _EXPECTED) | segments.close_to(part.box)
+        ):
+            if slot <= 1 or not segments.known[slot]:
+                continue
+            # A segment of which much is missing takes what is next to it, even in another light.
+            lacking = bool(segments.missing[slot]) and part.around[slot] > _LARGELY_BESIDE
+            fitting = part.colour[slot] < p.fitting_cost + (_LACKING if lacking else 0)
+            near = part.around[slot] > _BESIDE or part.guess[slot] > _EXPECTED
+            grows = segments.mover[slot] and (fitting or part.border or segments.young(slot))
+            if near and (grows or ((segments.moving[slot] or segments.missing[slot]) and fitting)):
+                score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
+            elif part.colour[slot] < p.fitting_cost - _SURELY:
+                score = part.colour[slot] + (_COME_TO_LIGHT if segments.hidden[slot] else _ELSEWHERE)
+            else:
+                continue
+            if score < least:
+                best, least, fits = int(slot), float(score), bool(fitting)
+        if not best and part.border:
+            best = segments.mover_close_by(part.box)
+        if best and (fits or part.border or segments.young(best)):
+            segments.moving[best] = True
+            return best
+        if part.border and part.area >= 2 * self.new_px:
+            return segments.found_again(part.fits, self.slots) or self._new(part, mover=True)
+        if not part.border and part.unknown_for >= p.wait_frames:
+            return self._put(part)
+        return UNTAUGHT + self.absorbing(part)
+
+    def left_behind(self, part: Part) -> int:
+        """Slot of a resting part that was taken for a mover, which has gone on: something it has put, or uncovered."""
+        if self._is_ground(part):
+            return UNTAUGHT + 1
+        fitting = np.where(self.segments.known, part.colour, np.inf)
+        fitting[[0, 1, part.slot]] = np.inf
+        # What is to be seen nowhere else is looked for.
+        fitting[self.segments.hidden] -= _ELSEWHERE - _COME_TO_LIGHT
+        fitting[self.segments.missing & (part.around > 0.15)] -= _LACKING
+        best = int(np.argmin(fitting))
+        if fitting[best] < self.parameters.fitting_cost - 1.5:
+            return best
+        return self._put(part)
+
+    def _is_ground(self, part: Part) -> bool:
+        """Whether a part lies in the background and has its colours: other light, no other thing."""
+        return bool(part.around[1] > 0.5 and part.colour[1] < self.parameters.fitting_cost)
+
+    def _put(self, part: Part) -> int:
+        """Slot of a part that came to rest: with what came to rest beside it in the same visit it is one thing."""
+        fresh = (self.segments.born > self.visit) & ~self.segments.mover & self.segments.known & (part.around > _BESIDE)
+        if fresh.any():
+            return int(np.argmax(np.where(fresh, part.around, 0)))
+        hand = float(part.around[self.segments.mover].sum())
+        large = part.area >= self.new_px and part.thick
+        if large and (hand < 0.3 or part.area >= 4 * self.new_px):
+            return self._new(part, mover=False)
+        return UNTAUGHT + self.absorbing(part)
+
+    def absorbing(self, part: Part) -> int:
+        """Slot that a part falls to which is too small, or not to be explained yet."""
+        weight = part.around + 0.3 * part.guess + 0.5 * part.below
+        weight[[0, part.slot]] = 0
+        return int(np.argmax(weight)) if weight.any() else 1
+
+    def _new(self, part: Part, *, mover: bool) -> int:
+        return self.segments.new(part.box, self.slots, self.rest, mover=mover)
