@@ -78,7 +78,7 @@ class Layers:
             kernels.relax(costs, lab, self.rest, moving, found, relaxed, np.float32(p.bond), awake)
             found, relaxed = relaxed, found
         slots = found.copy()
-        self._judge(slots, taught, predicted, bins)
+        self._judge(slots, taught, predicted, lab, bins)
         movers_there = segments.mover[slots].any()
         if not movers_there:
             self._visit = segments.n_steps
@@ -186,7 +186,9 @@ class Layers:
             cv2.blur(plane, (3, 3), dst=plane)
         return costs
 
-    def _judge(self, slots: Slots, taught: Slots, predicted: Slots, bins: NDArray[np.uint16]) -> None:
+    def _judge(
+        self, slots: Slots, taught: Slots, predicted: Slots, lab: Lab, bins: NDArray[np.uint16]
+    ) -> None:
         """Give every part that is small, unknown or left behind the segment it belongs to."""
         from sec_lab.segmentation import _part_kernels
 
@@ -229,7 +231,7 @@ class Layers:
                 new[at] = UNTAUGHT + taken
                 where = parts.where == at
                 self.rest[where] = taken
-                self._seen[where] = self.image[where]
+                self._seen[where] = lab[where]
             elif questions.remnant[at] and not questions.doubtful[at]:
                 pass  # a mover in front may have cut the segment in two
             elif part.slot == 0 and not questions.small[at]:
