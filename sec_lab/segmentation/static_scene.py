@@ -17,6 +17,7 @@ Floats = NDArray[np.float32]
 
 BACKGROUND = 1
 _RISES = 3.0
+_STRANGE = 2.0
 _JUMP = 6.0
 MAX_OBJECTS = 100
 
@@ -47,7 +48,8 @@ def static_segments(
     unusual = _unusualness(bins)
     rise = None if depth_m is None else rise_above_plane(depth_m)
     seeds = _seeds(unusual, rise, least_px)
-    whole = _parted(bins, _grown(lab, bins, seeds, rise, least_px), least_px)
+    grown = _confirmed(_grown(lab, bins, seeds, rise, least_px), unusual, rise)
+    whole = _parted(bins, grown, least_px)
     return _coloured(image, bins, whole, least_px)
 
 
@@ -100,20 +102,38 @@ def _least_squares(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np
 
 
 def _unusualness(bins: NDArray[np.uint16]) -> Floats:
-    """Minus log density of each colour among those at the borders of the picture, where the background is seen."""
+    """Minus log density of each colour among those at the borders of the picture, where the background is seen.
+
+    Of each colour the side that shows it most is left out: the background reaches more than one, and a thing that the
+    border cuts off is no part of it.
+    """
     import cv2
 
     from sec_lab.segmentation import _layer_kernels as kernels
 
     height, width = bins.shape
-    band = np.ones((height, width), np.uint8)
-    rows, columns = round(0.12 * height), round(0.12 * width)
-    band[rows:-rows, columns:-columns] = 0
-    counts = np.zeros((256, kernels.N_BINS), np.float32)
+    rows, columns = max(1, round(0.12 * height)), max(1, round(0.12 * width))
+    sides = (bins[:rows], bins[-rows:], bins[rows:-rows, :columns], bins[rows:-rows, -columns:])
+    counts = np.stack([np.bincount(side.ravel(), minlength=kernels.N_BINS) for side in sides]).astype(np.float32)
     table = np.zeros(kernels.N_BINS, np.float32)
-    kernels.count_colours(bins, band, np.ones_like(band), np.arange(256) == 1, counts)
-    kernels.colour_costs(counts[1], table)
+    kernels.colour_costs(counts.sum(axis=0) - counts.max(axis=0), table)
     return np.asarray(cv2.blur(table[bins], (5, 5)))
+
+
+def _confirmed(labels: Labels, unusual: Floats, rise: Floats | None) -> Labels:
+    """Objects that stand out as a whole, by height or by colour: what is so at its seed only was noise."""
+    if rise is None:
+        return labels
+    confirmed = labels.copy()
+    typical = float(np.median(unusual))
+    for slot in np.unique(labels[labels > BACKGROUND]):
+        inside = labels == slot
+        heights = rise[inside]
+        heights = heights[np.isfinite(heights)]
+        raised = len(heights) > 0.4 * inside.sum() and np.median(heights) >= _RISES
+        if not raised and np.median(unusual[inside]) < typical + _STRANGE:
+            confirmed[inside] = BACKGROUND
+    return confirmed
 
 
 def _seeds(unusual: Floats, rise: Floats | None, least_px: int) -> NDArray[np.int32]:
