@@ -92,6 +92,10 @@ def colour_costs(counts: Floats, costs: Floats) -> None:
                     smooth[at - 1] += np.float32(0.12) * value
                 if j < N_CHROMA - 1:
                     smooth[at + 1] += np.float32(0.12) * value
+    # Colours of one thing in another light lie farther apart than noise moves them, along a and b most.
+    wide = _spread(_spread(tempered))
+    for i in range(N_BINS):
+        smooth[i] = np.float32(0.85) * smooth[i] + np.float32(0.15) * wide[i]
     volume = np.float32(_LIGHTNESS_STEP * _CHROMA_STEP * _CHROMA_STEP)
     for level in range(N_LIGHTNESS):
         stretch = 2 * np.log(_MIDDLE / (level * _LIGHTNESS_STEP + 32.0))
@@ -103,6 +107,26 @@ def colour_costs(counts: Floats, costs: Floats) -> None:
                 value += weight * smooth[other * plane + k]
             density = np.float32(0.97) * value / (total * volume) + np.float32(1.2e-8)
             costs[level * plane + k] = min(-np.log(density) - stretch, CAP)
+
+
+@nb.njit(cache=True, nogil=True)
+def _spread(counts: Floats) -> Floats:
+    """Every count spread evenly over 5×5 bins of chroma; at the rim it stays inside."""
+    plane = N_CHROMA * N_CHROMA
+    rows, both = np.zeros(N_BINS, np.float32), np.zeros(N_BINS, np.float32)
+    for at in range(N_BINS):
+        if counts[at] != 0:
+            j = at % N_CHROMA
+            value = counts[at] / np.float32(5)
+            for step in range(-2, 3):
+                rows[at - j + min(max(j + step, 0), N_CHROMA - 1)] += value
+    for at in range(N_BINS):
+        if rows[at] != 0:
+            level, i, j = at // plane, at % plane // N_CHROMA, at % N_CHROMA
+            value = rows[at] / np.float32(5)
+            for step in range(-2, 3):
+                both[level * plane + min(max(i + step, 0), N_CHROMA - 1) * N_CHROMA + j] += value
+    return both
 
 
 @nb.njit(cache=True, nogil=True, inline="always")

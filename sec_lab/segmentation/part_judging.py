@@ -25,6 +25,8 @@ _ELSEWHERE, _COME_TO_LIGHT = 4.0, 2.0
 """Of a part away from its segment, by colour alone; and if the segment was hidden."""
 _LACKING = 2.5
 """By so much colours may fit worse if most of a segment is missing right here: it is in another light."""
+_CLEARLY = 2.0
+"""By so much another segment must fit worse for one to be known by colours that hardly fit."""
 _SURELY = 1.0
 """By so much colours must fit better where nothing but colour speaks for a segment."""
 
@@ -184,6 +186,8 @@ class Judge:
                 score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
             elif part.colour[slot] < p.fitting_cost - _SURELY:
                 score = part.colour[slot] + (_COME_TO_LIGHT if segments.hidden[slot] else _ELSEWHERE)
+            elif self._comes_to_light(part, slot):
+                score, fitting = part.colour[slot] + _COME_TO_LIGHT, True
             else:
                 continue
             if score < least:
@@ -212,6 +216,13 @@ class Judge:
         if fitting[best] < self.parameters.fitting_cost - 1.5:
             return best
         return self._put(part)
+
+    def _comes_to_light(self, part: Part, slot: int) -> bool:
+        """Whether a part is the hidden segment in another light: nothing else is nearly so like it."""
+        if not self.segments.hidden[slot] or part.area > 1.2 * self.segments.most_px[slot]:
+            return False
+        others = np.delete(part.colour, slot).min()
+        return bool(part.colour[slot] < min(self.parameters.unknown_cost, others - _CLEARLY))
 
     def _is_ground(self, part: Part) -> bool:
         """Whether a part lies in the background and has its colours: other light, no other thing."""

@@ -186,9 +186,7 @@ class Layers:
             cv2.blur(plane, (3, 3), dst=plane)
         return costs
 
-    def _judge(
-        self, slots: Slots, taught: Slots, predicted: Slots, lab: Lab, bins: NDArray[np.uint16]
-    ) -> None:
+    def _judge(self, slots: Slots, taught: Slots, predicted: Slots, lab: Lab, bins: NDArray[np.uint16]) -> None:
         """Give every part that is small, unknown or left behind the segment it belongs to."""
         from sec_lab.segmentation import _part_kernels
 

@@ -74,6 +74,23 @@ def test_count_colours(size: tuple[int, int], seed: int) -> None:
     assert {tuple(map(int, at)): counts[tuple(at)] for at in np.argwhere(counts)} == expected
 
 
+def test_another_light_costs_less_than_another_colour() -> None:
+    """Costs rise step by step up to four bins of chroma, as far as 5×5 bins spread twice; all count the same there."""
+    counts, costs = np.zeros(kernels.N_BINS, np.float32), np.empty(kernels.N_BINS, np.float32)
+    middle = (4 * 40 + 20) * 40 + 20
+    counts[middle] = 1000
+    kernels.colour_costs(counts, costs)
+    assert list(costs[middle : middle + 5]) == sorted(set(costs[middle : middle + 5].tolist()))
+    assert costs[middle + 4] < costs[middle + 5] == costs[middle + 9]
+    np.testing.assert_array_equal(costs[middle + 1 : middle + 5], costs[middle - 4 : middle][::-1])
+    # A tempered count spreads without loss, so the density over all bins stays one.
+    level = np.arange(kernels.N_BINS) // 1600
+    stretch = 2 * np.log(150 / (level * 32 + 32))
+    far = costs[(4 * 40 + 5) * 40 + 5]
+    density = np.exp(-costs - stretch) - np.exp(-far - stretch[middle])
+    assert (density[level == 4] * 32 * 4 * 4).sum() == pytest.approx(0.97 * 0.4, rel=0.02)
+
+
 def test_colour_costs_are_low_where_colours_were_seen() -> None:
     counts, costs = np.zeros(kernels.N_BINS, np.float32), np.empty(kernels.N_BINS, np.float32)
     kernels.colour_costs(counts, costs)
