@@ -186,7 +186,7 @@ class Judge:
                 score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
             elif part.colour[slot] < p.fitting_cost - _SURELY:
                 score = part.colour[slot] + (_COME_TO_LIGHT if segments.hidden[slot] else _ELSEWHERE)
-            elif self._comes_to_light(part, slot):
+            elif self._comes_to_light(part, int(slot)):
                 score, fitting = part.colour[slot] + _COME_TO_LIGHT, True
             else:
                 continue
