@@ -218,11 +218,18 @@ class Judge:
         return self._put(part)
 
     def _comes_to_light(self, part: Part, slot: int) -> bool:
-        """Whether a part is the hidden segment in another light: nothing else is nearly so like it."""
-        if not self.segments.hidden[slot] or part.area > 1.2 * self.segments.most_px[slot]:
+        """Whether a part is of a segment that is hidden, or that lacks it here: nothing else is nearly so like it."""
+        segments = self.segments
+        bound = self.parameters.unknown_cost
+        others = np.ones_like(segments.known)
+        if segments.missing[slot] and part.around[slot] > _LARGELY_BESIDE:
+            bound += _CLEARLY
+            others = part.around > _HARDLY_BESIDE
+        elif not segments.hidden[slot]:
             return False
-        others = np.delete(part.colour, slot).min()
-        return bool(part.colour[slot] < min(self.parameters.unknown_cost, others - _CLEARLY))
+        others[slot] = False
+        fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - _CLEARLY)
+        return bool(fits and part.area < 1.2 * segments.most_px[slot])
 
     def _is_ground(self, part: Part) -> bool:
         """Whether a part lies in the background and has its colours: other light, no other thing."""
