@@ -172,9 +172,10 @@ class Judge:
         if self._is_ground(part):
             return UNTAUGHT + 1
         best, least, fits = 0, np.inf, False
-        for slot in np.flatnonzero(
-            (part.around > _HARDLY_BESIDE) | (part.guess > _EXPECTED) | segments.close_to(part.box)
-        ):
+        asked = (part.around > _HARDLY_BESIDE) | (part.guess > _EXPECTED) | segments.close_to(part.box)
+        # What was carried under a hand comes to light far from where it was last seen.
+        asked |= segments.hidden & ~segments.mover
+        for slot in np.flatnonzero(asked):
             if slot <= 1 or not segments.known[slot]:
                 continue
             # A segment of which much is missing takes what is next to it, even in another light.
