@@ -22,6 +22,8 @@ _LIGHTNESS_STEP = 32.0
 _CHROMA_STEP = 4.0
 # Chroma is compared as it would be at this lightness: shading scales all three.
 _MIDDLE = 150.0
+# Density of colours that were never seen.
+_RARE = np.float32(1.2e-8)
 CAP = np.float32(16.0)
 """Largest cost: no colour is less likely under a label than under uniform noise."""
 
@@ -99,13 +101,17 @@ def colour_costs(counts: Floats, costs: Floats) -> None:
     volume = np.float32(_LIGHTNESS_STEP * _CHROMA_STEP * _CHROMA_STEP)
     for level in range(N_LIGHTNESS):
         stretch = 2 * np.log(_MIDDLE / (level * _LIGHTNESS_STEP + 32.0))
+        never = min(-np.log(_RARE) - stretch, CAP)
         for k in range(plane):
             value = np.float32(0)
             for other in range(max(0, level - 2), min(N_LIGHTNESS, level + 3)):
                 gap = abs(other - level)
                 weight = np.float32(0.4) if gap == 0 else (np.float32(0.24) if gap == 1 else np.float32(0.06))
                 value += weight * smooth[other * plane + k]
-            density = np.float32(0.97) * value / (total * volume) + np.float32(1.2e-8)
+            if value == 0:  # most colours, and logarithms are slow
+                costs[level * plane + k] = never
+                continue
+            density = np.float32(0.97) * value / (total * volume) + _RARE
             costs[level * plane + k] = min(-np.log(density) - stretch, CAP)
 
 
