@@ -271,3 +271,31 @@ def presence(
         if counts[slot, 3] > 0:
             boxes[slot] = fresh[slot]
     return counts, touched
+
+
+@nb.njit(cache=True, nogil=True)
+def uncovered(
+    slots: Slots,
+    rest: Slots,
+    carried: NDArray[np.bool_],
+    static_cost: Floats,
+    strange_cost: float,
+    resting_for: NDArray[np.uint8],
+    wait_frames: int,
+    still: NDArray[np.uint8],
+) -> int:
+    """Pixels of carried segments where these rested, that look otherwise than at rest: something below comes to light.
+
+    ``still`` (height, width) becomes for how long they have been still, in frames up to ``wait_frames``, 0 elsewhere.
+    The number of those that have been for as long as that is returned.
+    """
+    height, width = slots.shape
+    n = 0
+    for y in range(height):
+        for x in range(width):
+            slot = slots[y, x]
+            still[y, x] = 0
+            if carried[slot] and rest[y, x] == slot and static_cost[y, x] > strange_cost:
+                still[y, x] = min(resting_for[y, x], wait_frames)
+                n += resting_for[y, x] >= wait_frames
+    return n

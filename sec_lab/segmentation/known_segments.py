@@ -36,6 +36,8 @@ class KnownSegments:
         It is on the way, or is not where it rests.
     touched : bool
         A mover is next to it.
+    parted_off : bool
+        It lay below another segment, which was lifted off it.
     hidden, missing, present : bool
         Little of it, not all of it, something of it is to be seen.
     tables : (256, N_BINS) float32
@@ -59,6 +61,7 @@ class KnownSegments:
         self.mover = np.zeros(N_SLOTS, dtype=np.bool_)
         self.moving = np.zeros(N_SLOTS, dtype=np.bool_)
         self.touched = np.zeros(N_SLOTS, dtype=np.bool_)
+        self.parted_off = np.zeros(N_SLOTS, dtype=np.bool_)
         self.hidden = np.zeros(N_SLOTS, dtype=np.bool_)
         self.missing = np.zeros(N_SLOTS, dtype=np.bool_)
         self.present = np.zeros(N_SLOTS, dtype=np.bool_)
@@ -117,8 +120,9 @@ class KnownSegments:
     def _forget(self, slot: int) -> None:
         from sec_lab.segmentation import _layer_kernels as kernels
 
-        for flags in (self.known, self.mover, self.moving, self.hidden, self.missing, self.touched, self._has_first):
+        for flags in (self.known, self.mover, self.moving, self.hidden, self.missing, self.touched, self.parted_off):
             flags[slot] = False
+        self._has_first[slot] = False
         self.labels[slot] = 0
         self._counts[slot] = self._first_counts[slot] = 0
         self.tables[slot] = kernels.CAP

@@ -11,6 +11,12 @@ from sec_lab.segmentation.known_segments import KnownSegments, Slots
 from sec_lab.segmentation.layer_parameters import LayerParameters
 from sec_lab.segmentation.part_judging import UNTAUGHT, Judge, Part, parts_of, questions_about
 
+_OFF_SHARE = 0.2
+"""Share of the largest area of a segment that must come to light below it to be a thing of its own."""
+
+_STILL_FRAMES = 2
+"""Pixels that are still for so long belong to it, too."""
+
 
 class Layers:
     """The layers of a scene as seen so far: the static scene, the background behind it, the segments that move.
@@ -79,6 +85,7 @@ class Layers:
             found, relaxed = relaxed, found
         slots = found.copy()
         self._judge(slots, taught, predicted, lab, bins)
+        self._part_off(slots, taught, costs[0])
         movers_there = segments.mover[slots].any()
         if not movers_there:
             self._visit = segments.n_steps
@@ -237,3 +244,40 @@ class Layers:
             else:
                 new[at] = UNTAUGHT + judge.absorbing(part)
         _part_kernels.recolour(parts.where, new, slots, taught)
+
+    def _part_off(self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32]) -> None:
+        """Make a segment of what lay below another one that was lifted off it: two things, taken for one so far."""
+        import cv2
+
+        from sec_lab.segmentation import _part_kernels
+
+        segments, p = self._segments, self._p
+        carried = segments.moving & segments.known & ~segments.mover
+        carried[:2] = False
+        if not carried.any():
+            return
+        still = np.empty_like(slots)
+        wait = p.wait_frames // 2
+        n = _part_kernels.uncovered(
+            slots, self.rest, carried, static_cost, p.unknown_cost, self._resting_for, wait, still
+        )
+        if n < self._new_px:
+            return
+        square = np.ones((3, 3), np.uint8)
+        below = cv2.morphologyEx((still >= _STILL_FRAMES).astype(np.uint8), cv2.MORPH_OPEN, square)
+        n_parts, parts, boxes, _ = cv2.connectedComponentsWithStats(below, connectivity=4)
+        for part in range(1, n_parts):
+            where = parts == part
+            slot = int(slots[where][0])
+            least = max(self._new_px, _OFF_SHARE * segments.most_px[slot])
+            if (still[where] >= wait).sum() < least:
+                continue
+            around = slots[(cv2.dilate(where.view(np.uint8), square) > 0) & ~where]
+            beside = np.flatnonzero(np.bincount(around, minlength=256) > 0)
+            fresh = [k for k in beside if segments.parted_off[k]]
+            left, top, width, height = boxes[part, : cv2.CC_STAT_AREA]
+            box = np.array([top, left, top + height - 1, left + width - 1], dtype=np.int64)
+            new = fresh[0] if fresh else segments.new(box, self.slots, self.rest, mover=False)
+            segments.parted_off[new] = new > 1
+            slots[where] = new
+            taught[where] = 1

@@ -256,6 +256,20 @@ def test_bonds_hold_alike_colours_together() -> None:
     assert relaxed[1, 1] == 2
 
 
+@given(SIZES, SEEDS)
+def test_uncovered(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    slots, rest = labels(rng, size, [1, 2, 3]), labels(rng, size, [1, 2, 3])
+    carried = np.arange(256) == 2
+    cost = rng.choice([4, 12, 12.5], size).astype(np.float32)
+    resting_for = rng.choice([0, 1, 3, 4, 200], size).astype(np.uint8)
+    still = np.full(size, 77, np.uint8)
+    n = _part_kernels.uncovered(slots, rest, carried, cost, 12.0, resting_for, 4, still)
+    is_one = (slots == 2) & (rest == 2) & (cost > 12)
+    np.testing.assert_array_equal(still, np.where(is_one, np.minimum(resting_for, 4), 0))
+    assert n == (is_one & (resting_for >= 4)).sum()
+
+
 @given(SIZES, SEEDS, st.booleans())
 def test_settle(size: tuple[int, int], seed: int, any_mover: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -169,6 +169,40 @@ def carrying(first: Place, last: Place, others: Sequence[Block] = ()) -> list[Mo
     ]
 
 
+class TestLid:
+    """A red lid on a green box, of which a strip is to be seen: one thing, as long as nobody lifts the lid."""
+
+    BOX, ON, BESIDE = Block((50, 30), GREEN, 26, 22), (47.0, 30.0), (47.0, 76.0)
+
+    def lid(self, place: Place) -> Block:
+        return Block(place, RED, 22, 22)
+
+    def opened(self) -> Movie:
+        def moment(place: Place, hand: Place | None = None) -> Moment:
+            return Moment((self.BOX, self.lid(place)), hand)
+
+        def held(place: Place) -> Place:
+            return place[0], place[1] + 6
+
+        return Movie(
+            [
+                *[moment(self.ON)] * 8,
+                *(moment(self.ON, hand) for hand in path((47, OUTSIDE), held(self.ON))),
+                *(moment(place, held(place)) for place in path(self.ON, self.BESIDE)),
+                *(moment(self.BESIDE, hand) for hand in path(held(self.BESIDE), (47, OUTSIDE))),
+                *[moment(self.BESIDE)] * 16,
+            ]
+        )
+
+    def test_what_comes_to_light_below_it_is_a_segment_of_its_own(self) -> None:
+        movie = self.opened()
+        assert movie.seen(0) == {1, 2}
+        lid, box = movie.label(-1, 2), movie.label(-1, 1, share=0.7)
+        assert lid == movie.label(0, 2) == 2
+        assert box not in {1, lid, movie.label(30, HAND_NUMBER)}
+        assert movie.seen(-1) == {1, lid, box}
+
+
 class TestCarriedObject:
     @pytest.mark.parametrize(("first", "last"), [((24, 30), (24, 66)), ((24, 66), (24, 30)), ((20, 44), (74, 44))])
     def test_it_keeps_its_label_and_leaves_the_background(self, first: Place, last: Place) -> None:
