@@ -13,6 +13,7 @@ from sec_lab.event_chain import event_chain as event_chain
 
 if TYPE_CHECKING:
     import sec_lab.graphml as graphml
+    import sec_lab.ontology as ontology
     from sec_lab.classification import unsupervised_classes as unsupervised_classes
     from sec_lab.codes import Relation as Relation
     from sec_lab.event_chain import EventChain as EventChain
@@ -20,6 +21,13 @@ if TYPE_CHECKING:
     from sec_lab.pipeline import observe as observe
     from sec_lab.pipeline import observe_segments as observe_segments
     from sec_lab.recording import Recording as Recording
+    from sec_lab.role_classifier import RoleTableClassifier as RoleTableClassifier
+    from sec_lab.role_classifier import RoleTableNeighbour as RoleTableNeighbour
+    from sec_lab.role_tables import RoleTable as RoleTable
+    from sec_lab.role_tables import find_hand as find_hand
+    from sec_lab.role_tables import role_similarity as role_similarity
+    from sec_lab.role_tables import role_similarity_table as role_similarity_table
+    from sec_lab.role_tables import role_table as role_table
     from sec_lab.roles import AmbiguousRoleError as AmbiguousRoleError
     from sec_lab.roles import corresponding_segments as corresponding_segments
     from sec_lab.scene_graph import SceneGraph as SceneGraph
@@ -38,17 +46,24 @@ _ROOM_OF = {
     "Observation": "observation",
     "Recording": "recording",
     "Relation": "codes",
+    "RoleTable": "role_tables",
+    "RoleTableClassifier": "role_classifier",
+    "RoleTableNeighbour": "role_classifier",
     "SceneGraph": "scene_graph",
     "Segmentation": "segmentation",
     "compare": "similarity",
     "corresponding_segments": "roles",
+    "find_hand": "role_tables",
     "main_graphs": "scene_graph",
     "observe": "pipeline",
     "observe_segments": "pipeline",
+    "role_similarity": "role_tables",
+    "role_similarity_table": "role_tables",
+    "role_table": "role_tables",
     "similarity_table": "similarity",
     "unsupervised_classes": "classification",
 }
-_ROOMS = ("graphml",)
+_ROOMS = ("graphml", "ontology")
 __all__ = ["__version__", "event_chain", *_ROOM_OF, *_ROOMS]
 
 

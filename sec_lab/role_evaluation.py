@@ -1,0 +1,221 @@
+"""How well role tables recognise recordings that had no part in any choice.
+
+Whatever can be chosen (a step of cleaning, a strength of regularisation) is chosen anew for every recording that is
+judged, by those that are not judged: a nested run. Folds are made without chance, so a run is the same every time.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import clone
+
+from sec_lab.classification import Classes, leave_one_out
+from sec_lab.role_classifier import RoleTableClassifier
+from sec_lab.role_tables import RoleTable
+
+_LEAST_PROBABILITY = 1e-12
+
+Option = tuple[RoleTableClassifier, Sequence[RoleTable]]
+
+
+@dataclass(frozen=True, eq=False)
+class NestedAnswers:
+    """Answers of a nested run.
+
+    Attributes
+    ----------
+    predicted : (n,) ndarray
+        What each recording was recognised as.
+    chosen : tuple of n str
+        The option that was chosen for it.
+    """
+
+    predicted: NDArray[Any]
+    chosen: tuple[str, ...]
+
+
+def nested_neighbours(
+    similarities: Mapping[str, ArrayLike], classes: Classes, *, groups: "Classes | None" = None
+) -> NestedAnswers:
+    """Nearest neighbours, each by the table that serves best among the others.
+
+    The best table has the largest mean margin: how much more similar a recording is to its nearest neighbour of its own
+    class than to the nearest one of any other. The number of right answers would do as well but for its steps, by
+    which a single recording decides.
+
+    Parameters
+    ----------
+    similarities : mapping of str to (n, n) array_like of float
+        Options.
+    classes : (n,) array_like
+        What each recording shows.
+    groups : (n,) array_like, optional
+        What is left out together, e.g. all recordings of one person; each recording alone if left out.
+
+    Raises
+    ------
+    ValueError
+        If there is no option, or as in :func:`~sec_lab.classification.leave_one_out`.
+
+    Examples
+    --------
+    >>> good, bad = np.kron(np.eye(2), np.ones((3, 3))), np.kron(np.ones((3, 3)), np.eye(2))
+    >>> nested_neighbours({"bad": bad, "good": good}, list("aaabbb")).predicted.tolist()
+    ['a', 'a', 'a', 'b', 'b', 'b']
+    """
+    types, held_out = _outer(classes, groups)
+    tables = {name: np.asarray(table, np.float64) for name, table in similarities.items()}
+    if not tables:
+        raise ValueError("similarities: expected at least one option, got none")
+    predicted: NDArray[Any] = types.copy()
+    chosen = [""] * len(types)
+    for left in held_out:
+        train = np.flatnonzero(~left)
+        margins = {name: _mean_margin(table[np.ix_(train, train)], types[train]) for name, table in tables.items()}
+        best = max(margins, key=lambda name: margins[name])
+        for i in np.flatnonzero(left).tolist():
+            with_others = np.append(train, i)
+            among = tables[best][np.ix_(with_others, with_others)]
+            predicted[i] = leave_one_out(among, types[with_others])[-1]
+            chosen[i] = best
+    return NestedAnswers(predicted, tuple(chosen))
+
+
+def nested_classifier(
+    options: Mapping[str, Option], classes: Classes, *, groups: "Classes | None" = None, n_folds: int = 5
+) -> NestedAnswers:
+    """Answers of the classifier, each by the option that serves best among the others.
+
+    The best option gives the classes of the recordings the largest mean logarithm of their probability, in a cross
+    validation among the others.
+
+    Parameters
+    ----------
+    options : mapping of str to (RoleTableClassifier, sequence of n RoleTable)
+        A classifier, and the role tables of all recordings by its cleaning.
+    classes : (n,) array_like
+    groups : (n,) array_like, optional
+        What is left out together, for judging and for choosing; each recording alone if left out.
+    n_folds : int, optional
+        Parts into which the others are divided to choose, unless there are groups.
+
+    Raises
+    ------
+    ValueError
+        If there is no option, or an option has another number of tables than there are classes.
+    """
+    types, held_out = _outer(classes, groups)
+    if not options:
+        raise ValueError("options: expected at least one, got none")
+    for name, (_, tables) in options.items():
+        if len(tables) != len(types):
+            raise ValueError(f"options: expected {len(types)} role tables in {name!r}, got {len(tables)}")
+    parts = None if groups is None else np.asarray(groups)
+    predicted: NDArray[Any] = types.copy()
+    chosen = [""] * len(types)
+    for left in held_out:
+        train = np.flatnonzero(~left)
+        best = next(iter(options))
+        if len(options) > 1:
+            folds = _folds(types[train], n_folds) if parts is None else parts[train]
+            scores = {name: _mean_log_probability(option, types, train, folds) for name, option in options.items()}
+            best = max(scores, key=lambda name: scores[name])
+        answers = _answers(options[best], types, train, np.flatnonzero(left))
+        predicted[left] = answers
+        for i in np.flatnonzero(left).tolist():
+            chosen[i] = best
+    return NestedAnswers(predicted, tuple(chosen))
+
+
+def learning_curve(
+    option: Option,
+    classes: Classes,
+    *,
+    n_demonstrations: Sequence[int],
+    n_draws: int,
+    rng: np.random.Generator,
+) -> dict[int, NDArray[np.float64]]:
+    """Percent recognised of all others, after few demonstrations of each class.
+
+    Parameters
+    ----------
+    option : (RoleTableClassifier, sequence of n RoleTable)
+    classes : (n,) array_like
+    n_demonstrations : sequence of int
+        Demonstrations of each class that are learned from.
+    n_draws : int
+        How often demonstrations are drawn.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    dict of int to (n_draws,) float64
+
+    Raises
+    ------
+    ValueError
+        If a number leaves no recording to be judged, or a class has fewer recordings.
+    """
+    types = np.asarray(classes)
+    members = [np.flatnonzero(types == one) for one in dict.fromkeys(types.tolist())]
+    fewest = min(len(one) for one in members)
+    found = {}
+    for n in n_demonstrations:
+        if not 1 <= n < fewest:
+            raise ValueError(f"n_demonstrations: expected 1 to {fewest - 1}, got {n}")
+        draws = []
+        for _ in range(n_draws):
+            train = np.sort(np.concatenate([rng.choice(one, n, replace=False) for one in members]))
+            others = np.setdiff1d(np.arange(len(types)), train)
+            draws.append(100.0 * float((_answers(option, types, train, others) == types[others]).mean()))
+        found[n] = np.array(draws)
+    return found
+
+
+def _outer(classes: Classes, groups: "Classes | None") -> tuple[NDArray[Any], list[NDArray[np.bool_]]]:
+    types = np.asarray(classes)
+    parts = np.arange(len(types)) if groups is None else np.asarray(groups)
+    if parts.shape != types.shape:
+        raise ValueError(f"groups: expected one for each of {len(types)} recordings, got shape {parts.shape}")
+    return types, [parts == part for part in dict.fromkeys(parts.tolist())]
+
+
+def _folds(types: NDArray[Any], n_folds: int) -> NDArray[np.int64]:
+    """Fold of each recording: the members of each class are dealt out in turn."""
+    folds = np.empty(len(types), np.int64)
+    for one in dict.fromkeys(types.tolist()):
+        at = np.flatnonzero(types == one)
+        folds[at] = np.arange(len(at)) % n_folds
+    return folds
+
+
+def _mean_margin(similar: NDArray[np.float64], types: NDArray[Any]) -> float:
+    same = types[:, None] == types
+    others = ~np.eye(len(types), dtype=np.bool_)
+    own = np.where(same & others, similar, -np.inf).max(axis=1, initial=-np.inf)
+    foreign = np.where(same, -np.inf, similar).max(axis=1, initial=-np.inf)
+    judged = np.isfinite(own) & np.isfinite(foreign)
+    return float((own - foreign)[judged].mean()) if judged.any() else 0.0
+
+
+def _mean_log_probability(option: Option, types: NDArray[Any], train: NDArray[np.intp], folds: NDArray[Any]) -> float:
+    classifier, tables = option
+    logs = []
+    for fold in np.unique(folds):
+        learned, judged = train[folds != fold], train[folds == fold]
+        model = clone(classifier).fit([tables[i] for i in learned.tolist()], types[learned])
+        probabilities = model.predict_proba([tables[i] for i in judged.tolist()])
+        # A class that was not among the learned ones has no probability at all.
+        own = np.where(model.classes_ == types[judged][:, None], probabilities, 0.0).sum(axis=1)
+        logs.append(np.log(np.maximum(own, _LEAST_PROBABILITY)))
+    return float(np.concatenate(logs).mean())
+
+
+def _answers(option: Option, types: NDArray[Any], train: NDArray[np.intp], judged: NDArray[np.intp]) -> NDArray[Any]:
+    classifier, tables = option
+    model = clone(classifier).fit([tables[i] for i in train.tolist()], types[train])
+    found: NDArray[Any] = model.predict([tables[i] for i in judged.tolist()])
+    return found

@@ -1,0 +1,102 @@
+"""The hand, found without knowing what a hand looks like."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sec_lab.codes import Relation
+from sec_lab.role_tables.history import SegmentHistory
+
+
+@dataclass(frozen=True)
+class Hand:
+    """The segment that acts, or why none was found.
+
+    Attributes
+    ----------
+    segment : int or None
+        Label of the segment, None if there is no hand.
+    reason : str
+        By what it was told, or what is missing.
+    """
+
+    segment: int | None
+    reason: str
+
+
+def find_hand(history: SegmentHistory) -> Hand:
+    """The segment that comes from outside, acts and leaves again.
+
+    A hand is not there at first and at last, touches something in between, and of all such segments moves along the
+    longest path. Without places the one is taken that is there longest and touches and lets go most often (the
+    product of both).  If the movie begins or ends too early to see the hand come or go, a segment that is absent at
+    one of both ends will do.
+
+    Parameters
+    ----------
+    history : SegmentHistory
+        As recorded.
+
+    Returns
+    -------
+    Hand
+        Without a segment if nothing comes or goes, or what does touches nothing.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> from sec_lab.role_tables.history import segment_history
+    >>> seen = EventChain([[9, 0, 2, 0, 9], [9, 0, 0, 0, 9], [0, 0, 0, 0, 0]], [(1, 7), (2, 7), (1, 2)])
+    >>> find_hand(segment_history(seen)).segment
+    7
+    """
+    if len(history.members) < 2:
+        return Hand(None, f"expected at least two segments, got {len(history.members)}")
+    touching = history.relations == Relation.TOUCHING
+    touches = touching.any(axis=(1, 2))
+    if not touches.any():
+        return Hand(None, "nothing ever touches")
+    away_at_first, away_at_last = ~history.present[:, 0], ~history.present[:, -1]
+    for candidates, reason in (
+        (away_at_first & away_at_last, "absent at first and at last"),
+        (away_at_first | away_at_last, "absent at first or at last"),
+    ):
+        if (candidates & touches).any():
+            how, values = _activity(history, touching)
+            best = int(np.argmax(np.where(candidates & touches, values, -1.0)))
+            return Hand(history.members[best][0], f"{reason}, {how}")
+    why = (
+        "no segment comes or goes" if not (away_at_first | away_at_last).any() else "what comes or goes touches nothing"
+    )
+    return Hand(None, why)
+
+
+def path_lengths(history: SegmentHistory) -> NDArray[np.float64]:
+    """Length of the path of each segment, in the unit of its places, shape (n,); over absences as the crow flies.
+
+    Raises
+    ------
+    ValueError
+        If places are not known.
+    """
+    if history.places is None:
+        raise ValueError("places: expected those of all segments, got none")
+    filled = _held(history.places, history.present)
+    steps: NDArray[np.float64] = np.sqrt((np.diff(filled, axis=1) ** 2).sum(axis=2)).sum(axis=1)
+    return steps
+
+
+def _activity(history: SegmentHistory, touching: NDArray[np.bool_]) -> tuple[str, NDArray[np.float64]]:
+    if history.places is not None:
+        return "longest path", path_lengths(history)
+    changes = (touching[..., 1:] != touching[..., :-1]).sum(axis=(1, 2))
+    return "longest there and most often touching", (history.present @ history.shares) * (1.0 + changes)
+
+
+def _held(places: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Places with each absence filled by the last place before it, the first absence by the first place after it."""
+    at = np.where(present, np.arange(present.shape[1]), -1)
+    at = np.maximum(np.maximum.accumulate(at, axis=1), present.argmax(axis=1)[:, None])
+    held: NDArray[np.float64] = places[np.arange(len(places))[:, None], at]
+    return held

@@ -1,0 +1,163 @@
+"""What every segment did in the course of one movie: the form in which cleaning steps take and give a recording."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sec_lab.codes import Relation
+from sec_lab.event_chain import EventChain
+from sec_lab.observation import Observation
+
+PlaceUnit = Literal["px", "m", "unknown"]
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentHistory:
+    """When every segment was there, what it touched and where it was.
+
+    Attributes
+    ----------
+    members : tuple of n tuples of int
+        Labels of the recorded segments that each segment stands for; one label each until segments are merged.
+    present : (n, n_key_frames) bool
+    relations : (n, n, n_key_frames) uint8
+        0, 1 or 2 (:class:`~sec_lab.codes.Relation`), symmetric; 0 where one of the two is absent.
+    places : (n, n_key_frames, 2 or 3) float64 or None
+        (column, row) in pixels, or coordinates in space; NaN while a segment is absent. None if any is not known.
+    key_frames : (n_key_frames,) int64
+        Frame numbers, ascending.
+    """
+
+    members: tuple[tuple[int, ...], ...]
+    present: NDArray[np.bool_]
+    relations: NDArray[np.uint8]
+    places: NDArray[np.float64] | None
+    key_frames: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        n, n_key_frames = len(self.members), len(self.key_frames)
+        if self.present.shape != (n, n_key_frames):
+            raise ValueError(f"present: expected shape {(n, n_key_frames)}, got {self.present.shape}")
+        if self.relations.shape != (n, n, n_key_frames):
+            raise ValueError(f"relations: expected shape {(n, n, n_key_frames)}, got {self.relations.shape}")
+        if self.places is not None and (self.places.ndim != 3 or self.places.shape[:2] != (n, n_key_frames)):
+            raise ValueError(f"places: expected shape {(n, n_key_frames)} and coordinates, got {self.places.shape}")
+        for name in ("present", "relations", "places", "key_frames"):
+            array = getattr(self, name)
+            if array is not None:
+                # A view is protected, so that what is shared between steps needs no copy.
+                view = array.view()
+                view.setflags(write=False)
+                object.__setattr__(self, name, view)
+
+    @property
+    def shares(self) -> NDArray[np.float64]:
+        """Share of the time that each key frame stands for, see :func:`time_shares`."""
+        return time_shares(self.key_frames)
+
+    def index_of(self, segment: int) -> int:
+        """Where a recorded segment is now.
+
+        Raises
+        ------
+        ValueError
+            If it is not there (any more).
+        """
+        for i, labels in enumerate(self.members):
+            if segment in labels:
+                return i
+        raise ValueError(
+            f"segment: expected one of {[label for labels in self.members for label in labels]}, got {segment}"
+        )
+
+
+def time_shares(key_frames: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Share of the time that each key frame stands for, shape (n_key_frames,), sum 1.
+
+    A key frame holds until the next; for how long the last one holds is not recorded, so it counts as the median of the
+    others.
+
+    Examples
+    --------
+    >>> time_shares(np.array([0, 10, 40]))
+    array([0.16666667, 0.5       , 0.33333333])
+    """
+    if len(key_frames) == 1:
+        return np.ones(1)
+    lasting = np.diff(key_frames).astype(np.float64)
+    lasting = np.append(lasting, np.median(lasting))
+    shares: NDArray[np.float64] = lasting / lasting.sum()
+    return shares
+
+
+def segment_history(recording: Observation | EventChain) -> SegmentHistory:
+    """What every segment of a recording did, as it was recorded.
+
+    Parameters
+    ----------
+    recording : Observation or EventChain
+        A chain knows no places; a segment that is alone in the picture is not in its chain.
+
+    Raises
+    ------
+    ValueError
+        If it is neither, or no key frame has any content.
+
+    Examples
+    --------
+    >>> segment_history(EventChain([[0, 2, 9]], [(1, 2)])).present
+    array([[ True,  True, False],
+           [ True,  True, False]])
+    """
+    if isinstance(recording, EventChain):
+        return _of_chain(recording)
+    if isinstance(recording, Observation):
+        return _of_observation(recording)
+    raise ValueError(f"recording: expected an Observation or an EventChain, got {type(recording).__name__}")
+
+
+def _of_chain(chain: EventChain) -> SegmentHistory:
+    labels, at = np.unique(chain.pairs, return_inverse=True)
+    a, b = at.reshape(chain.pairs.shape).T
+    n, codes = len(labels), chain.relations
+    cube = np.full((n, n, codes.shape[1]), Relation.ABSENT, np.uint8)
+    cube[a, b] = cube[b, a] = codes
+    there = cube != Relation.ABSENT
+    cube[~there] = Relation.NON_TOUCHING
+    return SegmentHistory(tuple((label,) for label in labels.tolist()), there.any(axis=1), cube, None, chain.key_frames)
+
+
+def _of_observation(seen: Observation) -> SegmentHistory:
+    recorded = seen.recorded
+    graphs = recorded.graphs
+    labels = np.unique(np.concatenate([graph.segments for graph in graphs]))
+    n, n_key_frames = len(labels), len(graphs)
+    present = np.zeros((n_key_frames, n), np.bool_)
+    cube = np.zeros((n_key_frames, n, n), np.uint8)
+    known = n > 0 and all(graph.positions is not None or not len(graph.segments) for graph in graphs)
+    found = [graph.positions for graph in graphs if graph.positions is not None]
+    widths = {positions.shape[1] for positions in found}
+    known = known and len(widths) == 1
+    places = np.full((n_key_frames, n, widths.pop()), np.nan) if known else None
+    for k, graph in enumerate(graphs):
+        at = np.searchsorted(labels, graph.segments)
+        present[k, at] = True
+        cube[k, at[:, None], at] = graph.relations
+        if places is not None and graph.positions is not None:
+            places[k, at] = graph.positions
+    if places is not None:
+        places = _in_one_form(places, seen.position_unit).transpose(1, 0, 2)
+    members = tuple((label,) for label in labels.tolist())
+    return SegmentHistory(
+        members, present.T, np.ascontiguousarray(cube.transpose(1, 2, 0)), places, recorded.key_frames
+    )
+
+
+def _in_one_form(places: NDArray[np.float64], unit: PlaceUnit) -> NDArray[np.float64]:
+    """Places in pixels as (column, row), places in space as they are."""
+    if places.shape[2] == 3 and unit != "m" and not np.nan_to_num(places[..., 2]).any():
+        # Files in the dialect of A.2 without a unit write pixels as (row, column, 0).
+        return places[..., :2] if unit == "px" else places[..., 1::-1]
+    return places
