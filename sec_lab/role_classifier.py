@@ -208,9 +208,7 @@ class RoleTableClassifier(ClassifierMixin, BaseEstimator):
     def _checked(
         self, X: Sequence[Recording], y: ArrayLike
     ) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.float64]]:
-        known = np.asarray(y)
-        if known.ndim != 1 or len(known) != len(X):
-            raise ValueError(f"y: expected one class for each of {len(X)} recordings, got shape {known.shape}")
+        known = _as_classes(y, X)
         usable, features = self._features(X)
         if len(np.unique(known[usable])) < 2:
             raise ValueError(
@@ -260,9 +258,7 @@ class RoleTableNeighbour(ClassifierMixin, BaseEstimator):
 
     def fit(self, X: Sequence[Recording], y: ArrayLike) -> Self:
         """Remember the recordings (or their role tables) X and what they show, y, of shape (n,)."""
-        known = np.asarray(y)
-        if known.ndim != 1 or len(known) != len(X):
-            raise ValueError(f"y: expected one class for each of {len(X)} recordings, got shape {known.shape}")
+        known = _as_classes(y, X)
         tables = _tables(X, hands=self.hands, cleaning=self.cleaning)
         usable = _with_hand(tables, answer=self.without_hand)
         if not usable.any():
@@ -290,9 +286,21 @@ class RoleTableNeighbour(ClassifierMixin, BaseEstimator):
 
 
 def _tables(X: Sequence[Recording], *, hands: Sequence[int | str] | None, cleaning: Cleaning) -> list[RoleTable]:
+    _check_several(X)
+    return [role_table(one, hands=hands, cleaning=cleaning) for one in X]
+
+
+def _check_several(X: Sequence[Recording]) -> None:
     if isinstance(X, RoleTable | Observation | EventChain):
         raise ValueError(f"X: expected a sequence of recordings, got a single {type(X).__name__}")
-    return [role_table(one, hands=hands, cleaning=cleaning) for one in X]
+
+
+def _as_classes(y: ArrayLike, X: Sequence[Recording]) -> NDArray[Any]:
+    _check_several(X)
+    known = np.asarray(y)
+    if known.ndim != 1 or len(known) != len(X):
+        raise ValueError(f"y: expected one class for each of {len(X)} recordings, got shape {known.shape}")
+    return known
 
 
 def _with_hand(tables: Sequence[RoleTable], *, answer: object) -> NDArray[np.bool_]:

@@ -124,6 +124,9 @@ def drop_untouched(history: SegmentHistory, *, keep: int | None = None) -> Segme
 def bridge_absences(history: SegmentHistory) -> SegmentHistory:
     """Let a segment that vanishes and comes back be there in between, as it was when it was last seen.
 
+    If two are hidden, or one is, their relation is the one of the key frame in which the one that has been hidden for
+    longer was last seen.
+
     Examples
     --------
     >>> from sec_lab.event_chain import EventChain
@@ -144,12 +147,13 @@ def bridge_absences(history: SegmentHistory) -> SegmentHistory:
         return history
     relations = history.relations.copy()
     places = None if history.places is None else history.places.copy()
+    # When each segment was last seen; before and after its life it does not matter.
+    seen = np.maximum.accumulate(np.where(present | ~within, time, -1), axis=1)
+    every = np.arange(len(present))[:, None]
     for i in gaps.tolist():
-        at = np.maximum.accumulate(np.where(present[i] | ~within[i], time, -1))
-        relations[i] = relations[i][:, at]
-        relations[:, i] = relations[:, i][:, at]
+        relations[i] = relations[:, i] = history.relations[i][every, np.minimum(seen, seen[i])]
         if places is not None:
-            places[i] = places[i, at]
+            places[i] = places[i, seen[i]]
     relations *= within[:, None] & within[None]
     return replace(history, present=within, relations=relations, places=places)
 

@@ -148,7 +148,8 @@ def role_table(
     Parameters
     ----------
     recording : Observation, EventChain or SegmentHistory
-        Whatever it comes from: a movie, label masks, boxes, GraphML. A RoleTable is given back as it is.
+        Whatever it comes from: a movie, label masks, boxes, GraphML. A RoleTable is given back as it is. An observation
+        says more than its chain: positions, and what is alone in the picture.
     hands : sequence of int or str, optional
         Labels or names of the segments that are known to be the hand; together they are one. If left out, it is found.
     cleaning : Cleaning, optional
@@ -253,7 +254,8 @@ def _roles(history: SegmentHistory) -> tuple[list[int | None], dict[str, str]]:
     held = (history.relations[0] == Relation.TOUCHING) @ history.shares
     held[0] = 0.0
     if not held.any():
-        why = "the hand touches nothing"
+        alone = len(history.members[0]) == 1
+        why = "the hand touches nothing" if alone else "all that touches the hand comes and goes with it"
         return at, {ROLES[1]: why, **dict.fromkeys(ROLES[2:], "there is no object 1")}
     first = int(held.argmax())
     second = _worked_on(history, first, others=(0, first))
