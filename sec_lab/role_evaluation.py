@@ -6,15 +6,20 @@ judged, by those that are not judged: a nested run. Folds are made without chanc
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 
 from sec_lab.classification import Classes, leave_one_out
+from sec_lab.observation import Observation
+from sec_lab.recognition import rate
 from sec_lab.role_classifier import RoleTableClassifier
-from sec_lab.role_tables import RoleTable
+from sec_lab.role_tables import Cleaning, Compressed, RoleTable, role_similarity_table, role_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _LEAST_PROBABILITY = 1e-12
 
@@ -128,6 +133,62 @@ def nested_classifier(
         for i in np.flatnonzero(left).tolist():
             chosen[i] = best
     return NestedAnswers(predicted, tuple(chosen))
+
+
+def ingredient_table(
+    recordings: Mapping[str, Observation],
+    classes: Classes,
+    *,
+    cleanings: Mapping[str, Cleaning],
+    strengths: Sequence[float] = (0.3, 1.0),
+    nested: bool = True,
+) -> "pd.DataFrame":
+    """What each way of cleaning changes, leave-one-out.
+
+    Parameters
+    ----------
+    recordings : mapping of str to Observation
+    classes : (n,) array_like
+        What each recording shows.
+    cleanings : mapping of str to Cleaning
+        What is compared.
+    strengths : sequence of float, optional
+        Values of C that the nested run chooses from; the other run takes the default.
+    nested : bool, optional
+        Run the nested choice too; it takes longest.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row a cleaning: how many are recognised by their nearest neighbour (with rows compressed to changes, and with
+        the compression chosen in a nested run), by the classifier, and by the classifier with a nested choice of C; of
+        the last of these runs percent and Wilson interval.
+    """
+    import pandas as pd
+
+    rows = {}
+    types = np.asarray(classes)
+    for name, cleaning in cleanings.items():
+        tables = [role_table(one, cleaning=cleaning) for one in recordings.values()]
+        similar = {way: role_similarity_table(tables, compressed=way) for way in get_args(Compressed)}
+        row = {
+            "neighbour": int((nested_neighbours({"changes": similar["changes"]}, types).predicted == types).sum()),
+            "neighbour, nested": int((nested_neighbours(similar, types).predicted == types).sum()),
+        }
+        alone = {"default": (RoleTableClassifier(), tables)}
+        row["classifier"] = int((nested_classifier(alone, types).predicted == types).sum())
+        last = row["classifier"]
+        if nested:
+            options = {f"C = {C}": (RoleTableClassifier(C=C), tables) for C in strengths}
+            last = int((nested_classifier(options, types, n_folds=3).predicted == types).sum())
+            row["classifier, nested"] = last
+        found = rate(last, len(types))
+        rows[name] = row | {
+            "percent": found.percent,
+            "low_percent": found.low_percent,
+            "high_percent": found.high_percent,
+        }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("cleaned")
 
 
 def learning_curve(

@@ -4,7 +4,7 @@ Real chains drown in fragments and bystanders. Every step takes a history and gi
 to know what the segments are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +63,46 @@ class Cleaning:
 
 NO_CLEANING = Cleaning(touching_only=False, bridged=False, hand_percent=None, short_percent=None, together_percent=None)
 """Nothing is cleaned: what the steps are measured against."""
+
+
+STEPS: Mapping[str, str] = {
+    "touching_only": "only what ever touches",
+    "bridged": "absences bridged",
+    "hand_percent": "fragments merged to the hand",
+    "short_percent": "short-lived dropped",
+    "together_percent": "moving together merged",
+}
+"""The steps in words, by their parameter."""
+
+
+def cleanings_step_by_step() -> dict[str, Cleaning]:
+    """Nothing cleaned, then each step of :data:`STEPS` added to those before it.
+
+    Examples
+    --------
+    >>> list(cleanings_step_by_step())[:3]
+    ['nothing', '+ only what ever touches', '+ absences bridged']
+    """
+    found, now = {"nothing": NO_CLEANING}, NO_CLEANING
+    for step, words in STEPS.items():
+        now = replace(now, **{step: getattr(Cleaning(), step)})
+        found[f"+ {words}"] = now
+    return found
+
+
+def cleanings_one_by_one() -> dict[str, Cleaning]:
+    """Each step of :data:`STEPS` alone, and all but it.
+
+    Examples
+    --------
+    >>> len(cleanings_one_by_one()), cleanings_one_by_one()["all but: absences bridged"].bridged
+    (10, False)
+    """
+    whole = Cleaning()
+    alone = {f"only: {words}": replace(NO_CLEANING, **{step: getattr(whole, step)}) for step, words in STEPS.items()}
+    return alone | {
+        f"all but: {words}": replace(whole, **{step: getattr(NO_CLEANING, step)}) for step, words in STEPS.items()
+    }
 
 
 def clean(history: SegmentHistory, *, hands: Sequence[int], cleaning: Cleaning) -> SegmentHistory:

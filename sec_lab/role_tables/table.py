@@ -104,6 +104,12 @@ class RoleTable:
         """Share of the time that each key frame stands for, as of :class:`~sec_lab.role_tables.SegmentHistory`."""
         return time_shares(self.key_frames)
 
+    @property
+    def chain(self) -> EventChain:
+        """The five relations as an event chain between segments 1 (hand) to 5 (partner), named by their roles."""
+        pairs = [(a + 1, b + 1) for a, b in ROWS]
+        return EventChain(self.relations, pairs, self.key_frames, dict(enumerate(ROLES, 1)))
+
     def name_of(self, role: str) -> str:
         """What a role is called: the name of its segment where it has one, else its label; "–" if it is missing."""
         labels = self.segments[role]
