@@ -7,6 +7,7 @@
 :func:`role_similarity`        two role tables → similarity in percent
 :func:`role_similarity_table`  all of them with each other
 :func:`in_words`               a role table, told
+:func:`played_by`              who plays each role in many recordings
 =============================  ======================================================================
 """
 
@@ -27,7 +28,7 @@ from sec_lab.role_tables.hand import Hand, find_hand
 from sec_lab.role_tables.history import SegmentHistory, segment_history
 from sec_lab.role_tables.similarity import Compressed, role_similarity, role_similarity_table
 from sec_lab.role_tables.table import ROLES, ROWS, RoleTable, role_table
-from sec_lab.role_tables.words import in_words
+from sec_lab.role_tables.words import in_words, played_by
 
 __all__ = [
     "Cleaning",
@@ -49,6 +50,7 @@ __all__ = [
     "in_words",
     "merge_moving_together",
     "merge_with_hand",
+    "played_by",
     "role_similarity",
     "role_similarity_table",
     "role_table",

@@ -1,8 +1,14 @@
 """What a role table says, in words."""
 
+from collections.abc import Hashable, Mapping
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sec_lab.role_tables.table import POSITIONS, ROLES, ROWS, RoleTable
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def in_words(table: RoleTable) -> str:
@@ -68,6 +74,40 @@ def in_words(table: RoleTable) -> str:
         if what == POSITIONS or not why.startswith("there is no"):
             lines.append(f"There {'are' if what == POSITIONS else 'is'} no {what}: {why}.")
     return "\n".join(lines)
+
+
+def played_by(tables: Mapping[Hashable, RoleTable]) -> "pd.DataFrame":
+    """Who plays each role in many recordings: the names of the segments, or their labels.
+
+    Parameters
+    ----------
+    tables : mapping of any key to RoleTable
+        By name of the recording; tuples of the same length make several levels.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row a recording, a column a role; "–" where a role is missing.
+
+    Raises
+    ------
+    ValueError
+        If there is no table.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> from sec_lab.role_tables.table import role_table
+    >>> seen = EventChain([[9, 2, 9], [9, 0, 9], [0, 0, 0]], [(7, 1), (7, 2), (1, 2)], names={7: "arm"})
+    >>> played_by({"one": role_table(seen)}).loc["one"].tolist()
+    ['arm', '1', '–', '–', '–']
+    """
+    import pandas as pd
+
+    if not tables:
+        raise ValueError("tables: expected at least one role table, got none")
+    rows = [[table.name_of(role) for role in ROLES] for table in tables.values()]
+    return pd.DataFrame(rows, index=pd.Index(list(tables)), columns=list(ROLES))
 
 
 def _joined(parts: list[str]) -> str:

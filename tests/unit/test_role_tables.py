@@ -18,6 +18,7 @@ from sec_lab.role_tables import (
     ROWS,
     RoleTable,
     in_words,
+    played_by,
     role_similarity,
     role_similarity_table,
     role_table,
@@ -212,6 +213,14 @@ def test_table_for_people_shows_changes_only() -> None:
     assert frame.shape == (10, 6)
     assert frame.columns.tolist() == [0, 1, 3, 5, 6, 7]
     assert frame.loc["object 1 – object 2"].tolist() == [2, 2, 2, 0, 0, 0]
+
+
+def test_who_plays_what_in_several_takes() -> None:
+    found = played_by({("one", 1): role_table(TAKE), ("one", 2): role_table(PUT)})
+    assert found.index.nlevels == 2
+    assert found.loc[("one", 2)].tolist() == ["arm", "cup", "box", "–", "–"]
+    with pytest.raises(ValueError, match="tables: expected at least one"):
+        played_by({})
 
 
 def test_tables_travel_and_are_write_protected() -> None:
