@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab.codes import Relation
-from sec_lab.role_tables.history import SegmentHistory
+from sec_lab.event_chain import EventChain
+from sec_lab.observation import Observation
+from sec_lab.role_tables.history import SegmentHistory, segment_history
 
 
 @dataclass(frozen=True)
@@ -25,17 +27,17 @@ class Hand:
     reason: str
 
 
-def find_hand(history: SegmentHistory) -> Hand:
+def find_hand(recording: Observation | EventChain | SegmentHistory) -> Hand:
     """The segment that comes from outside, acts and leaves again.
 
     A hand is not there at first and at last, touches something in between, and of all such segments moves along the
     longest path. Without places the one is taken that is there longest and touches and lets go most often (the
-    product of both).  If the movie begins or ends too early to see the hand come or go, a segment that is absent at
+    product of both). If the movie begins or ends too early to see the hand come or go, a segment that is absent at
     one of both ends will do.
 
     Parameters
     ----------
-    history : SegmentHistory
+    recording : Observation, EventChain or SegmentHistory
         As recorded.
 
     Returns
@@ -43,14 +45,18 @@ def find_hand(history: SegmentHistory) -> Hand:
     Hand
         Without a segment if nothing comes or goes, or what does touches nothing.
 
+    Raises
+    ------
+    ValueError
+        If the recording is something else, or has no content.
+
     Examples
     --------
-    >>> from sec_lab.event_chain import EventChain
-    >>> from sec_lab.role_tables.history import segment_history
     >>> seen = EventChain([[9, 0, 2, 0, 9], [9, 0, 0, 0, 9], [0, 0, 0, 0, 0]], [(1, 7), (2, 7), (1, 2)])
-    >>> find_hand(segment_history(seen)).segment
-    7
+    >>> find_hand(seen)
+    Hand(segment=7, reason='absent at first and at last, longest there and most often touching')
     """
+    history = recording if isinstance(recording, SegmentHistory) else segment_history(recording)
     if len(history.members) < 2:
         return Hand(None, f"expected at least two segments, got {len(history.members)}")
     touching = history.relations == Relation.TOUCHING

@@ -199,12 +199,12 @@ def test_a_hand_without_positions_is_told_by_presence_and_touch() -> None:
 )
 def test_no_hand_is_said_with_its_reason(rows: list[list[int]], reason: str) -> None:
     pairs = [(1, 2), (1, 3), (2, 3)][: len(rows)]
-    found = find_hand(segment_history(EventChain(rows, pairs)))
+    found = find_hand(EventChain(rows, pairs))
     assert (found.segment, found.reason) == (None, reason)
 
 
 def test_one_segment_is_no_hand() -> None:
-    found = find_hand(segment_history(Observation([SceneGraph([4], [[0]])], [0])))
+    found = find_hand(Observation([SceneGraph([4], [[0]])], [0]))
     assert (found.segment, found.reason) == (None, "expected at least two segments, got 1")
 
 
