@@ -75,8 +75,8 @@ def align(
 ) -> float:  # fmt: skip
     """Find the rows and columns of a model in a chain: partner of each, or −1; returns ψ_temporal in percent.
 
-    The strong rows and columns are compared as in step 5; then rows and columns by turns keep or find the partner with
-    which more than half of their entries agree. What is left over is offered to the weak rows and columns.
+    The strong rows and columns are compared as in step 5; then rows and columns by turns keep or find the partner
+    with which two thirds of a row and more than half of a column agree. What is left over is offered to the weak ones.
     """
     rows, columns = np.flatnonzero(strong_rows), np.flatnonzero(strong_columns)
     a = np.empty((len(rows), len(columns)), np.uint8)
@@ -241,7 +241,7 @@ def align_columns(a: Codes, b: Codes, partner: Integers, strong: Flags, columns:
 
 @compiled
 def agreement(a: Codes, b: Codes, rows: Integers, others: Integers, columns: Integers) -> Integers:
-    """Equal entries in aligned columns of each pair of rows, 0 where it is not more than half; padded to be wide."""
+    """Equal entries in aligned columns of each pair of rows, 0 where it is less than two thirds; padded to be wide."""
     aligned = np.flatnonzero(columns >= 0)
     gain = np.zeros((len(rows), max(len(rows), len(others))), np.int64)
     for i in range(len(rows)):
@@ -249,7 +249,7 @@ def agreement(a: Codes, b: Codes, rows: Integers, others: Integers, columns: Int
             equal = 0
             for x in aligned:
                 equal += a[rows[i], x] == b[others[j], columns[x]]
-            gain[i, j] = equal if 2 * equal > len(aligned) else 0
+            gain[i, j] = equal if 3 * equal >= 2 * len(aligned) else 0
     return gain
 
 

@@ -141,13 +141,14 @@ def make_model(
 def _columns_without_event(
     codes: NDArray[np.uint8], rows: NDArray[np.int64], columns: NDArray[np.int64], counts: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Of two neighbours that differ in deleted rows only, the one that fewer demonstrations have."""
+    """Of two neighbours that differ in deleted rows only, or not in equally many demonstrations, the rarer one."""
     without = np.zeros(len(columns), np.bool_)
     kept, whole = codes[rows][:, columns], codes[:, columns]
     last = 0
     for x in range(1, len(columns)):
         same = (kept[:, x] == kept[:, last]).all()
-        if same and (whole[:, x] != whole[:, last]).any():
+        rarer = counts[columns[x]] != counts[columns[last]]
+        if same and (rarer or (whole[:, x] != whole[:, last]).any()):
             if counts[columns[x]] > counts[columns[last]]:
                 without[last] = True
                 last = x

@@ -56,11 +56,11 @@ class ActionModel:
     >>> frames = [[0, 4, 9], [2, 3, -1]]
     >>> model = ActionModel(chain, [1, 0.5], [1, 1, 0.5], ["first", "second"], {"first": {2: 7}}, frames)
     >>> model.to_frame()
-                0  1    2  weight
+               0    1    2  weight
     pair
-    1, hand     0  2  2.0     1.0
-    hand, 3     0  0  2.0     0.5
-    weight    1.0  1  0.5     NaN
+    1, hand    0    2    2     1.0
+    hand, 3    0    0    2     0.5
+    weight   1.0  1.0  0.5     NaN
     """
 
     chain: EventChain
@@ -117,8 +117,8 @@ class ActionModel:
         """Table for people, as Fig. 2.10 (b): the relations, ω^r at the right, ω^c at the bottom."""
         import pandas as pd
 
-        frame = self.chain.to_frame()
-        bottom = pd.DataFrame([self.column_weights], index=["weight"], columns=frame.columns)
+        frame = self.chain.to_frame().astype(object)
+        bottom = pd.DataFrame([self.column_weights], index=["weight"], columns=frame.columns, dtype=object)
         whole = pd.concat([frame, bottom]).rename_axis("pair")
         whole.columns.name = None
         whole["weight"] = np.append(self.row_weights, np.nan)
@@ -149,7 +149,7 @@ def _as_demonstrations(demonstrations: Sequence[str]) -> tuple[str, ...]:
 def _as_roles(
     roles: Mapping[str, Mapping[int, int]], names: tuple[str, ...], chain: EventChain
 ) -> Mapping[str, Mapping[int, int]]:
-    unknown = next((name for name in roles if name not in set(names)), None)
+    unknown = next(iter(roles.keys() - set(names)), None)
     if unknown is not None:
         raise ValueError(f"roles: expected names of demonstrations, got {unknown!r}")
     segments = set(chain.segments.tolist())

@@ -39,6 +39,7 @@ TYPE_THRESHOLD_PERCENT = 64.0
 SAMPLE = 40
 """Demonstrations from which the rows and columns of a model are gathered in batch mode; all others vote on them."""
 
+_MOST_BALLOTS = 5
 _CHUNK = 256
 
 
@@ -89,14 +90,14 @@ def learn(
     >>> putting = EventChain([[0, 2, 2, 0], [0, 0, 2, 2]], [(1, 2), (2, 3)])
     >>> noisy = EventChain([[0, 2, 2, 2, 0], [0, 0, 2, 2, 2], [0, 0, 0, 2, 2]], [(7, 8), (8, 9), (7, 9)])
     >>> model = learn([putting, noisy, putting])
-    >>> model.chain.relations.tolist(), model.row_weights, model.roles["2"]
+    >>> model.chain.relations.tolist(), model.row_weights, dict(model.roles["2"])
     ([[0, 2, 2, 0], [0, 0, 2, 2]], array([1., 1.]), {1: 7, 2: 8, 3: 9})
 
     Notes
     -----
     Weights are normalised occurrences. Entries are what most demonstrations have where both row and column correspond:
-    more than half of the entries of a row (over the aligned columns) and of a column (over the corresponding rows)
-    have to agree. Columns that are left without any difference when a row is deleted are no events, and are joined.
+    two thirds of the entries of a row (over the aligned columns) and more than half of those of a column (over the
+    corresponding rows) have to agree. Columns that are left without any difference are no events, and are joined.
     """
     if mode not in get_args(Mode):
         raise ValueError(f"mode: expected one of {get_args(Mode)}, got {mode!r}")
@@ -115,9 +116,13 @@ def learn(
     packed = Packed([_chain_of(one) for one in given], names)
     frame = _gather(packed, options)
     kept = often_enough(_vote(packed, frame, options, n_threads), options)
-    # Once more without what was deleted, so that nothing of a demonstration is lost to it.
-    ballot = _vote(packed, kept.frame, options, n_threads)
-    kept = often_enough(ballot, options)
+    # Again without what was deleted, so that nothing of a demonstration is lost to it.
+    for _ in range(_MOST_BALLOTS):
+        before = kept.frame.codes
+        ballot = _vote(packed, kept.frame, options, n_threads)
+        kept = often_enough(ballot, options)
+        if np.array_equal(kept.frame.codes, before):
+            break
     return make_model(packed, given, kept, ballot.rows[:, kept.rows], ballot.columns[:, kept.columns])
 
 
