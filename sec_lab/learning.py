@@ -39,7 +39,8 @@ TYPE_THRESHOLD_PERCENT = 64.0
 SAMPLE = 40
 """Demonstrations from which the rows and columns of a model are gathered in batch mode; all others vote on them."""
 
-_MOST_BALLOTS = 5
+_SETTLING = 200
+_MOST_BALLOTS = 6
 _CHUNK = 256
 
 
@@ -115,14 +116,22 @@ def learn(
         raise ValueError(f"demonstrations: expected at least two, got {len(given)}")
     packed = Packed([_chain_of(one) for one in given], names)
     frame = _gather(packed, options)
-    kept = often_enough(_vote(packed, frame, options, n_threads), options)
-    # Again without what was deleted, so that nothing of a demonstration is lost to it.
+    # A part of the demonstrations settles what is deleted, all of them have the last word; then again without that, so
+    # that nothing of a demonstration is lost to it.
+    some = np.unique(np.linspace(0, len(given) - 1, min(len(given), _SETTLING)).astype(int))
+    kept = often_enough(_vote(packed, frame, options, n_threads, some), options)
+    voters = some
     for _ in range(_MOST_BALLOTS):
         before = kept.frame.codes
-        ballot = _vote(packed, kept.frame, options, n_threads)
+        ballot = _vote(packed, kept.frame, options, n_threads, voters)
         kept = often_enough(ballot, options)
         if np.array_equal(kept.frame.codes, before):
-            break
+            if len(voters) == len(given):
+                break
+            voters = np.arange(len(given))
+    if len(voters) < len(given):
+        ballot = _vote(packed, kept.frame, options, n_threads, np.arange(len(given)))
+        kept = often_enough(ballot, options)
     return make_model(packed, given, kept, ballot.rows[:, kept.rows], ballot.columns[:, kept.columns])
 
 
@@ -222,7 +231,7 @@ class OnlineLearner:
             ), self._options,
         )  # fmt: skip
         packed = Packed([_chain_of(one) for one in self._given], self.accepted)
-        ballot = _vote(packed, kept.frame, self._options, 1)
+        ballot = _vote(packed, kept.frame, self._options, 1, np.arange(len(self._given)))
         return make_model(packed, self._given, kept, ballot.rows, ballot.columns)
 
 
@@ -333,17 +342,17 @@ def _gather(packed: Packed, options: Options) -> Frame:
     return Frame(profile.codes[rows][:, columns], strong_rows[rows], strong_columns[columns])
 
 
-def _vote(packed: Packed, frame: Frame, options: Options, n_threads: int | None) -> Ballot:
-    """Let every demonstration vote on the entries of the rows and columns that it has."""
-    n, (m, u) = len(packed.n_columns), frame.codes.shape
+def _vote(packed: Packed, frame: Frame, options: Options, n_threads: int | None, voters: NDArray[np.int64]) -> Ballot:
+    """Let demonstrations vote on the entries of the rows and columns that they have."""
+    n, (m, u) = len(voters), frame.codes.shape
+    starts, n_changing, n_columns = packed.code_starts[voters], packed.n_changing[voters], packed.n_columns[voters]
     rows, columns, similarity = np.empty((n, m), np.int64), np.empty((n, u), np.int64), np.empty(n)
     codes = np.ascontiguousarray(frame.codes)
 
     def task(part: tuple[int, int]) -> None:
         kernels.align_chains(
-            *part, codes, frame.strong_rows, frame.strong_columns, packed.codes, packed.code_starts, packed.n_changing,
-            packed.n_columns, int(options.shorter), options.tolerance_percent, options.effort, rows, columns,
-            similarity,
+            *part, codes, frame.strong_rows, frame.strong_columns, packed.codes, starts, n_changing, n_columns,
+            int(options.shorter), options.tolerance_percent, options.effort, rows, columns, similarity,
         )  # fmt: skip
 
     parts = list(pairwise([*range(0, n, _CHUNK), n]))
@@ -353,7 +362,7 @@ def _vote(packed: Packed, frame: Frame, options: Options, n_threads: int | None)
         with ThreadPoolExecutor(n_threads or len(os.sched_getaffinity(0))) as pool:
             list(pool.map(task, parts))
     votes = np.zeros((m, u, kernels.N_CODES), np.int64)
-    kernels.count_votes(packed.codes, packed.code_starts, packed.n_columns, rows, columns, votes)
+    kernels.count_votes(packed.codes, starts, n_columns, rows, columns, votes)
     return Ballot(votes, codes, (rows >= 0).sum(axis=0), (columns >= 0).sum(axis=0), n, rows, columns)
 
 
