@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from sec_lab.classification import unsupervised_classes as unsupervised_classes
     from sec_lab.codes import Relation as Relation
     from sec_lab.event_chain import EventChain as EventChain
+    from sec_lab.finding import OnlineFinder as OnlineFinder
+    from sec_lab.finding import find_actions as find_actions
+    from sec_lab.finding import time_slices as time_slices
     from sec_lab.learning import OnlineLearner as OnlineLearner
     from sec_lab.learning import learn as learn
     from sec_lab.learning import learn_types as learn_types
@@ -41,6 +44,7 @@ _ROOM_OF = {
     "EventChain": "event_chain",
     "Match": "similarity",
     "Observation": "observation",
+    "OnlineFinder": "finding",
     "OnlineLearner": "learning",
     "Recording": "recording",
     "Relation": "codes",
@@ -48,12 +52,14 @@ _ROOM_OF = {
     "Segmentation": "segmentation",
     "compare": "similarity",
     "corresponding_segments": "roles",
+    "find_actions": "finding",
     "learn": "learning",
     "learn_types": "learning",
     "main_graphs": "scene_graph",
     "observe": "pipeline",
     "observe_segments": "pipeline",
     "similarity_table": "similarity",
+    "time_slices": "finding",
     "unsupervised_classes": "classification",
 }
 _ROOMS = ("graphml",)
