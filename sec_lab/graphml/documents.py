@@ -40,7 +40,8 @@ def read(path: str | os.PathLike[str], *, missing_edges: MissingEdges = "error")
     Returns
     -------
     Observation or ActionModel
-        A model if the file is one. Of an observation: positions in the unit of the file; types of nodes as written. Names come from ``<ReplaceObject>`` (None for
+        A model if the file is one. Of an observation: positions in the unit of the file; types of nodes as
+        written. Names come from ``<ReplaceObject>`` (None for
         ``null``), otherwise from types that are known and the same in all key frames. A key frame without content was
         *not recorded*, its graph is None. Of two names for one segment the last counts, and a warning is logged.
 
@@ -98,7 +99,7 @@ def read_model(path: str | os.PathLike[str]) -> ActionModel:
 
 
 def write(path: str | os.PathLike[str], content: Observation | ActionModel, *, dialect: Dialect | None = None) -> None:
-    """Write what was seen in one movie, or a model, as GraphML, whole or not at all; :func:`read` gives it back unchanged.
+    """Write what was seen in one movie, or a model, whole or not at all; :func:`read` gives it back unchanged.
 
     Parameters
     ----------
@@ -106,7 +107,8 @@ def write(path: str | os.PathLike[str], content: Observation | ActionModel, *, d
         Where the file goes; its folder must exist.
     content : Observation or ActionModel
     dialect : {"thesis", "standard"}, optional
-        The dialect of A.2 (default for an observation; it knows no models), or standard GraphML (always for a model), one graph a key frame, which graph programs open. Of several
+        The dialect of A.2 (default for an observation; it knows no models), or standard GraphML (always for a
+        model), one graph a key frame, which graph programs open. Of several
         graphs ``networkx.read_graphml`` gives the first; ``networkx.GraphMLReader()(path)`` goes through all of them.
 
     Raises
@@ -114,7 +116,8 @@ def write(path: str | os.PathLike[str], content: Observation | ActionModel, *, d
     TypeError
         If it is neither.
     ValueError
-        If the dialect is unknown or knows no models, or a name cannot be written: it has control characters, or it is "null", which
+        If the dialect is unknown or knows no models, or a name cannot be written: it has control characters, or it is
+        "null", which
         means *no object* in the dialect of A.2.
     UnusableFileError
         If the file cannot be written.

@@ -64,11 +64,9 @@ def to_text(model: ActionModel) -> str:
         "names": list(model.demonstrations),
         "roles": [list(map(list, model.roles[name].items())) for name in model.demonstrations],
         "key_frames": model.key_frames.tolist(),
-        "positions": None if model.positions is None else np.where(
-            np.isnan(model.positions), None, model.positions.astype(object)
-        ).tolist(),
+        "positions": None if model.positions is None else _without_nan(model.positions.tolist()),
         "position_unit": model.position_unit,
-    }  # fmt: skip
+    }
     unseen = {str(segment): name for segment, name in chain.names.items() if segment not in segments}
     for name in (*model.demonstrations, *(name or "" for name in unseen.values())):
         writable(name, what="name")
@@ -223,12 +221,13 @@ class _Reader:
                 source, target = (whole_number(child.attrib[end], what=f"edge {end}") for end in ("source", "target"))
                 values = self.data(child, "edge")
                 _expect(values, _TYPE_OF["edge"], what=f"edge {(source, target)}")
-                if values["relation"] not in _RELATION_OF:
+                word = values["relation"]
+                if word not in _RELATION_OF:
                     raise ValueError(
-                        f"edge {(source, target)}: expected one of {list(_RELATION_OF)}, got {shown(values['relation'])}"
+                        f"edge {(source, target)}: expected one of {list(_RELATION_OF)}, got {shown(word)}"
                     )
                 pairs.append((source, target))
-                relations.append(_RELATION_OF[values["relation"]])
+                relations.append(_RELATION_OF[word])
                 weights.append(finite_number(values["row_weight"], what="row_weight"))
         frame = whole_number(data["key_frame"], what="key_frame")
         weight = finite_number(data["column_weight"], what="column_weight")
@@ -266,6 +265,12 @@ class _Reader:
 def _expect(values: Mapping[str, object], wanted: "Mapping[str, str] | tuple[str, ...]", *, what: str) -> None:
     if set(values) != set(wanted):
         raise ValueError(f"{what}: expected data {', '.join(wanted)}, got {', '.join(values) or 'none'}")
+
+
+def _without_nan(values: Any) -> Any:
+    if isinstance(values, list):
+        return [_without_nan(value) for value in values]
+    return None if np.isnan(values) else values
 
 
 def _refuse(constant: str) -> None:
