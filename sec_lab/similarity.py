@@ -204,6 +204,7 @@ def pairwise_similarity(
     temporal_input: TemporalInput = "original",
     effort: int = EFFORT,
     measures: Sequence[Measure] = ("spatial", "temporal"),
+    n_seeds: int | None = None,
     n_threads: int | None = None,
     progress: bool = False,
 ) -> PairwiseSimilarity:
@@ -214,6 +215,8 @@ def pairwise_similarity(
     chains : sequence of n EventChain
     measures : sequence of {"spatial", "temporal"}, optional
         What is computed.
+    n_seeds : int, optional
+        Compare only the first ``n_seeds`` chains with the others; all other similarities are NaN.
     n_threads : int, optional
         Threads to use, all cores if left out; the result is the same for any number.
     progress : bool, optional
@@ -222,7 +225,8 @@ def pairwise_similarity(
     Raises
     ------
     ValueError
-        If there is no chain, a chain has a single column or no change, or an option is unknown.
+        If there is no chain, a chain has a single column or no change, an option is unknown, or ``n_seeds`` is not 1
+        to n − 1.
 
     Examples
     --------
@@ -237,7 +241,9 @@ def pairwise_similarity(
     check_options(normalizer, tolerance_percent, temporal_input, effort)
     packed = PackedChains(chains, [f"chain {i}" for i in range(len(chains))], derived=temporal_input == "derived")
     n = len(chains)
-    spatial, temporal = (np.empty((n, n) if name in measures else (0, 0)) for name in ("spatial", "temporal"))
+    if n_seeds is not None and not 1 <= n_seeds < n:
+        raise ValueError(f"n_seeds: expected 1 to {n - 1} of {n} chains, got {n_seeds}")
+    spatial, temporal = (np.full((n, n) if name in measures else (0, 0), np.nan) for name in ("spatial", "temporal"))
     exact = np.zeros(temporal.shape, np.bool_)
     _fill(
         packed,
@@ -249,6 +255,7 @@ def pairwise_similarity(
         temporal,
         exact,
         n_threads,
+        n_seeds=n_seeds,
         progress=progress,
     )
     for array in (spatial, temporal, exact):
@@ -424,6 +431,7 @@ def _fill(
     exact: NDArray[np.bool_],
     n_threads: int | None,
     *,
+    n_seeds: int | None = None,
     progress: bool,
 ) -> int:
     """Fill the tables, one task a chain; returns the number of pairs solved exactly."""
@@ -438,8 +446,9 @@ def _fill(
         kernels.row_similarities_of_kinds(packed.symbols, packed.symbol_starts, *kinds, shorter, kind_table)
 
     def task(i: int) -> int:
+        begin = i if n_seeds is None else n_seeds
         n_exact: int = compare_with_later(
-            i, packed.row_starts, packed.n_columns, packed.codes, packed.code_starts, packed.lanes,
+            i, begin, packed.row_starts, packed.n_columns, packed.codes, packed.code_starts, packed.lanes,
             packed.lane_starts, packed.n_codes, packed.first, packed.kinds, kind_table, packed.symbols,
             packed.symbol_starts, shorter, float(tolerance_percent), effort, mode, temporal, spatial, exact,
         )  # fmt: skip
@@ -450,8 +459,8 @@ def _fill(
             if kind_table.size:
                 edges = np.unique(np.linspace(0, n_kinds, 65).astype(int)).tolist()
                 list(pool.map(tabulate, pairwise(edges)))
-            done = pool.map(task, range(n))
-            return sum(tqdm(done, total=n, unit="chain", desc="comparing", disable=not progress))
+            done = pool.map(task, range(n_seeds or n))
+            return sum(tqdm(done, total=n_seeds or n, unit="chain", desc="comparing", disable=not progress))
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
