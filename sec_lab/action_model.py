@@ -15,6 +15,8 @@ from sec_lab.observation import PositionUnit
 if TYPE_CHECKING:
     import pandas as pd
 
+_WORD = {0: "apart", 1: "overlapping", 2: "touching", 9: "absent"}
+
 NOT_SEEN = -1
 """Key frame of a column that a demonstration does not have."""
 
@@ -123,6 +125,31 @@ class ActionModel:
         whole.columns.name = None
         whole["weight"] = np.append(self.row_weights, np.nan)
         return whole
+
+    def in_words(self) -> "pd.DataFrame":
+        """Say in words what happens in each row, the heaviest rows first.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index: names of the two roles where known, labels otherwise; columns: ``what happens`` and ``weight``.
+
+        Examples
+        --------
+        >>> chain = EventChain([[9, 0, 2, 2, 0]], [(1, 2)], names={1: "hand", 2: "cup"})
+        >>> model = ActionModel(chain, [0.9], [1] * 5, ["one"], {}, [[0, 1, 2, 3, 4]])
+        >>> model.in_words().loc["hand, cup"].to_dict()
+        {'what happens': 'absent, apart, touching, apart', 'weight': 0.9}
+        """
+        import pandas as pd
+
+        rows = []
+        for row in np.argsort(-self.row_weights, kind="stable").tolist():
+            codes = self.chain.relations[row].tolist()
+            changes = [code for i, code in enumerate(codes) if i == 0 or code != codes[i - 1]]
+            said = ", ".join(_WORD[code] for code in changes)
+            rows.append({"roles": self.chain.row_label(row), "what happens": said, "weight": self.row_weights[row]})
+        return pd.DataFrame(rows).set_index("roles")
 
 
 def _as_weights(weights: ArrayLike, n: int, *, what: str) -> NDArray[np.float64]:

@@ -88,10 +88,8 @@ def model_lines(model: "ActionModel") -> list[str]:
     chain = model.chain
     labels = [chain.row_label(row) for row in range(len(chain.pairs))]
     wide = max(len(label) for label in [*labels, "weight"])
-    lines = [
-        f"model of {len(model.demonstrations)} demonstrations: {len(labels)} rows, {len(chain.key_frames)} columns",
-        "",
-    ]
+    size = f"{len(labels)} rows, {len(chain.key_frames)} columns"
+    lines = [f"model of {len(model.demonstrations)} demonstrations: {size}", ""]
     for label, row, weight in zip(labels, chain.relations.tolist(), model.row_weights.tolist(), strict=True):
         lines.append(f"{label:<{wide}}  {' '.join(f'{code:>4}' for code in row)}  {weight:.2f}")
     lines.append(f"{'weight':<{wide}}  {' '.join(f'{weight:.2f}' for weight in model.column_weights.tolist())}")
