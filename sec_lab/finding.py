@@ -308,17 +308,20 @@ def _best_cast(
     pattern: _Pattern, movie: NDArray[np.uint8], pair: NDArray[np.intp], first: int, last: int
 ) -> tuple[float, NDArray[np.int64]]:
     """Who plays which role if the first contact is this one, and how well it fits."""
-    n_columns = pattern.codes.shape[1] if last >= 0 or pattern.end < 0 else pattern.end
+    whole = pattern.codes.shape[1]
+    # While the contact lasts, any of the columns from its begin to its end may be the last that has come.
+    come = [whole] if last >= 0 or pattern.end < 0 else range(pattern.begin + 1, pattern.end + 1)
     best, cast = -1.0, np.empty(0, np.int64)
-    for ends in (pair, pair[::-1]):
-        played = np.full(len(pattern.roles), -1, np.int64)
-        played[pattern.ends[pattern.row]] = ends
-        value = kernels.cast_roles(
-            movie, pattern.codes, pattern.ends, pattern.row_weights, pattern.column_weights, played, first, last,
-            pattern.begin, pattern.end, n_columns,
-        )  # fmt: skip
-        if value > best + 1e-12:
-            best, cast = float(value), played
+    for n_columns in come:
+        for ends in (pair, pair[::-1]):
+            played = np.full(len(pattern.roles), -1, np.int64)
+            played[pattern.ends[pattern.row]] = ends
+            value = kernels.cast_roles(
+                movie, pattern.codes, pattern.ends, pattern.row_weights, pattern.column_weights, played, first, last,
+                pattern.begin, pattern.end, n_columns,
+            )  # fmt: skip
+            if value > best + 1e-12:
+                best, cast = float(value), played
     return best, cast
 
 
@@ -341,13 +344,11 @@ def _contacts(relation: NDArray[np.uint8], pattern: _Pattern) -> list[tuple[int,
 
 
 def _cube(chain: EventChain) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-    """Segments of the rows that change, and relations of all pairs of them at every key frame, absent if unknown."""
-    changing = chain.changing_rows
-    segments = np.unique(chain.pairs[changing])
+    """All segments, and relations of all pairs of them at every key frame, absent if unknown."""
+    segments = chain.segments
     cube = np.full((chain.relations.shape[1], len(segments), len(segments)), _ABSENT, np.uint8)
-    known = np.isin(chain.pairs, segments).all(axis=1)
-    first, second = np.searchsorted(segments, chain.pairs[known]).T
-    codes = _CODE[chain.relations[known]].T
+    first, second = np.searchsorted(segments, chain.pairs).T
+    codes = _CODE[chain.relations].T
     cube[:, first, second] = codes
     cube[:, second, first] = codes
     return segments, cube
