@@ -14,9 +14,16 @@ from sec_lab.event_chain import event_chain as event_chain
 if TYPE_CHECKING:
     import sec_lab.graphml as graphml
     import sec_lab.ontology as ontology
+    from sec_lab.action_model import ActionModel as ActionModel
     from sec_lab.classification import unsupervised_classes as unsupervised_classes
     from sec_lab.codes import Relation as Relation
     from sec_lab.event_chain import EventChain as EventChain
+    from sec_lab.finding import OnlineFinder as OnlineFinder
+    from sec_lab.finding import find_actions as find_actions
+    from sec_lab.finding import time_slices as time_slices
+    from sec_lab.learning import OnlineLearner as OnlineLearner
+    from sec_lab.learning import learn as learn
+    from sec_lab.learning import learn_types as learn_types
     from sec_lab.observation import Observation as Observation
     from sec_lab.pipeline import observe as observe
     from sec_lab.pipeline import observe_segments as observe_segments
@@ -40,10 +47,13 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _ROOM_OF = {
+    "ActionModel": "action_model",
     "AmbiguousRoleError": "roles",
     "EventChain": "event_chain",
     "Match": "similarity",
     "Observation": "observation",
+    "OnlineFinder": "finding",
+    "OnlineLearner": "learning",
     "Recording": "recording",
     "Relation": "codes",
     "RoleTable": "role_tables",
@@ -54,6 +64,9 @@ _ROOM_OF = {
     "compare": "similarity",
     "corresponding_segments": "roles",
     "find_hand": "role_tables",
+    "find_actions": "finding",
+    "learn": "learning",
+    "learn_types": "learning",
     "main_graphs": "scene_graph",
     "observe": "pipeline",
     "observe_segments": "pipeline",
@@ -61,6 +74,7 @@ _ROOM_OF = {
     "role_similarity_table": "role_tables",
     "role_table": "role_tables",
     "similarity_table": "similarity",
+    "time_slices": "finding",
     "unsupervised_classes": "classification",
 }
 _ROOMS = ("graphml", "ontology")

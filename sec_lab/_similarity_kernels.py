@@ -10,6 +10,7 @@ from sec_lab._permutation_kernels import best_permutation
 @compiled
 def compare_with_later(
     i: int,
+    begin: int,
     row_starts: Integers,
     columns: Integers,
     codes: Codes,
@@ -30,7 +31,7 @@ def compare_with_later(
     spatial: Numbers,
     exact: Flags,
 ) -> int:
-    """Compare chain ``i`` with itself and all later ones, and write both directions into the tables.
+    """Compare chain ``i`` with all chains from ``begin`` ≥ i on, and write both directions into the tables.
 
     ``mode`` says what is written: 0 each direction as it is, 1 their mean, 2 the smaller, 3 the larger. A table of size
     0 is left out. Returns how many of the pairs with later chains were solved exactly.
@@ -38,7 +39,7 @@ def compare_with_later(
     n_chains = len(columns)
     m, u = row_starts[i + 1] - row_starts[i], columns[i]
     most_rows, most_columns = 0, 0
-    for j in range(i, n_chains):
+    for j in range(begin, n_chains):
         most_rows = max(most_rows, row_starts[j + 1] - row_starts[j])
         most_columns = max(most_columns, columns[j])
     assigned = np.empty(m, np.int64)
@@ -54,7 +55,7 @@ def compare_with_later(
     scratch = room_to_work(m, most_rows, u, most_columns, n_codes)
     chains = Chains(codes, lanes, first)
     n_exact = 0
-    for j in range(i, n_chains):
+    for j in range(begin, n_chains):
         k, v = row_starts[j + 1] - row_starts[j], columns[j]
         for q in range(k):
             kind_b = kinds[row_starts[j] + q]

@@ -143,7 +143,7 @@ def compare(
     one-to-one alignments (LCS). Rows that never change drop out of the temporal step too (Table 2.2), and rows without
     any similarity (0 %) never correspond, whatever the tolerance.
     """
-    _check_options(normalizer, tolerance_percent, temporal_input, effort)
+    check_options(normalizer, tolerance_percent, temporal_input, effort)
     packed = PackedChains([a, b], ["first chain", "second chain"], derived=temporal_input == "derived")
     (m, k), (u, v) = packed.n_rows.tolist(), packed.n_columns.tolist()
     symbols = [packed.symbols_of(row) for row in range(m + k)]
@@ -204,6 +204,7 @@ def pairwise_similarity(
     temporal_input: TemporalInput = "original",
     effort: int = EFFORT,
     measures: Sequence[Measure] = ("spatial", "temporal"),
+    n_seeds: int | None = None,
     n_threads: int | None = None,
     progress: bool = False,
 ) -> PairwiseSimilarity:
@@ -214,6 +215,8 @@ def pairwise_similarity(
     chains : sequence of n EventChain
     measures : sequence of {"spatial", "temporal"}, optional
         What is computed.
+    n_seeds : int, optional
+        Compare only the first ``n_seeds`` chains with the others; all other similarities are NaN.
     n_threads : int, optional
         Threads to use, all cores if left out; the result is the same for any number.
     progress : bool, optional
@@ -222,7 +225,8 @@ def pairwise_similarity(
     Raises
     ------
     ValueError
-        If there is no chain, a chain has a single column or no change, or an option is unknown.
+        If there is no chain, a chain has a single column or no change, an option is unknown, or ``n_seeds`` is not 1
+        to n − 1.
 
     Examples
     --------
@@ -234,10 +238,12 @@ def pairwise_similarity(
     for measure in measures:
         if measure not in get_args(Measure):
             raise ValueError(f"measures: expected {get_args(Measure)}, got {measure!r}")
-    _check_options(normalizer, tolerance_percent, temporal_input, effort)
+    check_options(normalizer, tolerance_percent, temporal_input, effort)
     packed = PackedChains(chains, [f"chain {i}" for i in range(len(chains))], derived=temporal_input == "derived")
     n = len(chains)
-    spatial, temporal = (np.empty((n, n) if name in measures else (0, 0)) for name in ("spatial", "temporal"))
+    if n_seeds is not None and not 1 <= n_seeds < n:
+        raise ValueError(f"n_seeds: expected 1 to {n - 1} of {n} chains, got {n_seeds}")
+    spatial, temporal = (np.full((n, n) if name in measures else (0, 0), np.nan) for name in ("spatial", "temporal"))
     exact = np.zeros(temporal.shape, np.bool_)
     _fill(
         packed,
@@ -249,6 +255,7 @@ def pairwise_similarity(
         temporal,
         exact,
         n_threads,
+        n_seeds=n_seeds,
         progress=progress,
     )
     for array in (spatial, temporal, exact):
@@ -310,7 +317,7 @@ def similarity_table(
         raise ValueError(f"direction: expected one of {get_args(Direction)}, got {direction!r}")
     if measure not in get_args(Measure):
         raise ValueError(f"measure: expected one of {get_args(Measure)}, got {measure!r}")
-    _check_options(normalizer, tolerance_percent, temporal_input, effort)
+    check_options(normalizer, tolerance_percent, temporal_input, effort)
     names = list(chains) if isinstance(chains, Mapping) else list(range(len(chains)))
     values = list(chains.values()) if isinstance(chains, Mapping) else list(chains)
     packed = PackedChains(values, [f"chain {name}" for name in names], derived=temporal_input == "derived")
@@ -424,6 +431,7 @@ def _fill(
     exact: NDArray[np.bool_],
     n_threads: int | None,
     *,
+    n_seeds: int | None = None,
     progress: bool,
 ) -> int:
     """Fill the tables, one task a chain; returns the number of pairs solved exactly."""
@@ -438,8 +446,9 @@ def _fill(
         kernels.row_similarities_of_kinds(packed.symbols, packed.symbol_starts, *kinds, shorter, kind_table)
 
     def task(i: int) -> int:
+        begin = i if n_seeds is None else n_seeds
         n_exact: int = compare_with_later(
-            i, packed.row_starts, packed.n_columns, packed.codes, packed.code_starts, packed.lanes,
+            i, begin, packed.row_starts, packed.n_columns, packed.codes, packed.code_starts, packed.lanes,
             packed.lane_starts, packed.n_codes, packed.first, packed.kinds, kind_table, packed.symbols,
             packed.symbol_starts, shorter, float(tolerance_percent), effort, mode, temporal, spatial, exact,
         )  # fmt: skip
@@ -450,8 +459,8 @@ def _fill(
             if kind_table.size:
                 edges = np.unique(np.linspace(0, n_kinds, 65).astype(int)).tolist()
                 list(pool.map(tabulate, pairwise(edges)))
-            done = pool.map(task, range(n))
-            return sum(tqdm(done, total=n, unit="chain", desc="comparing", disable=not progress))
+            done = pool.map(task, range(n_seeds or n))
+            return sum(tqdm(done, total=n_seeds or n, unit="chain", desc="comparing", disable=not progress))
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
@@ -463,7 +472,13 @@ def _spread_over_identical_rows(classes: NDArray[np.int64], first: NDArray[np.in
     return np.array([next(members[c]) if c >= 0 else -1 for c in classes.tolist()], np.int64)
 
 
-def _check_options(normalizer: str, tolerance_percent: float, temporal_input: str, effort: int) -> None:
+def check_options(normalizer: str, tolerance_percent: float, temporal_input: str, effort: int) -> None:
+    """Refuse options of :func:`compare` that are unknown or out of range.
+
+    Raises
+    ------
+    ValueError
+    """
     if normalizer not in get_args(Normalizer):
         raise ValueError(f"normalizer: expected one of {get_args(Normalizer)}, got {normalizer!r}")
     if temporal_input not in get_args(TemporalInput):

@@ -24,7 +24,7 @@ def add_chain_commands(commands: Commands) -> None:
     )
     compare.add_argument("a", type=Path, metavar="A", help="seed or model (ξ¹): GraphML or SEC.dat table")
     compare.add_argument("b", type=Path, metavar="B", help="what is held against it (ξ²)")
-    _add_similarity_options(compare)
+    add_similarity_options(compare)
     compare.set_defaults(run=_compare)
 
     table = add_command(
@@ -42,11 +42,12 @@ def add_chain_commands(commands: Commands) -> None:
         default="mean",
         help="how both directions of a pair become one number (default: mean; directed: row = seed)",
     )
-    _add_similarity_options(table)
+    add_similarity_options(table)
     table.set_defaults(run=_table)
 
 
-def _add_similarity_options(command: argparse.ArgumentParser) -> None:
+def add_similarity_options(command: argparse.ArgumentParser) -> None:
+    """Add the choices of :func:`~sec_lab.similarity.compare` to a command."""
     command.add_argument(
         "--normalizer",
         choices=("longer", "shorter"),
@@ -118,7 +119,7 @@ def _table(options: argparse.Namespace) -> int:
     from sec_lab.similarity import similarity_table
 
     read = [_read_comparable(path) for path in options.chains]
-    names = _short_names(options.chains)
+    names = short_names(options.chains)
     chains = dict(zip(names, read, strict=True))
     table = similarity_table(
         chains,
@@ -161,7 +162,7 @@ def _read_comparable(path: Path) -> "EventChain":
     return chain
 
 
-def _short_names(paths: Sequence[Path]) -> list[str]:
+def short_names(paths: Sequence[Path]) -> list[str]:
     """As few trailing parts of each path as tell all of them apart, without the ending."""
     twice = next((path for i, path in enumerate(paths) if path in paths[:i]), None)
     if twice is not None:

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from sec_lab.cli.chains import add_chain_commands
+from sec_lab.cli.learning import add_learning_commands
 from sec_lab.cli.observe import add_observe_command
 from sec_lab.cli.report import add_report_command
 from sec_lab.cli.speaking import Parser, say
@@ -50,5 +51,6 @@ def _parser() -> Parser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     add_observe_command(commands)
     add_chain_commands(commands)
+    add_learning_commands(commands)
     add_report_command(commands)
     return parser

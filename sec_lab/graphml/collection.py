@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sec_lab.files import UnusableFileError
 from sec_lab.graphml.assembly import MissingEdges
-from sec_lab.graphml.documents import read
+from sec_lab.graphml.documents import read_observation
 from sec_lab.observation import Observation
 
 _PLAIN_NAME = "GraphML.xml"
@@ -58,7 +58,7 @@ def read_collection(folder: str | os.PathLike[str], *, missing_edges: MissingEdg
         path_of[name] = path
     if not path_of:
         raise UnusableFileError(f"{top}: expected files named {_PLAIN_NAME} or *.graphml below it, but there is none")
-    return {name: read(path, missing_edges=missing_edges) for name, path in path_of.items()}
+    return {name: read_observation(path, missing_edges=missing_edges) for name, path in path_of.items()}
 
 
 def manipulation(name: str) -> str:

@@ -1,13 +1,15 @@
 """Whole files: which of the two GraphML kinds they are, read and written."""
 
 import os
+from itertools import chain as chained
 from pathlib import Path
 from typing import Literal, get_args
 
+from sec_lab.action_model import ActionModel
 from sec_lab.event_chain import EventChain
 from sec_lab.files import UnusableFileError, read_whole, write_whole
 from sec_lab.graphml import dialect as thesis_dialect
-from sec_lab.graphml import standard
+from sec_lab.graphml import models, standard
 from sec_lab.graphml.assembly import MissingEdges
 from sec_lab.graphml.markup import elements, local_name
 from sec_lab.graphml.tables import chain_of_table
@@ -19,8 +21,8 @@ _MOST_CHAIN_ENTRIES = 1 << 24
 _XML_BEGINNINGS = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe", b"\xfe\xff", b"<\x00", b"\x00<")
 
 
-def read(path: str | os.PathLike[str], *, missing_edges: MissingEdges = "error") -> Observation:
-    """Read what was seen in one movie from a GraphML file.
+def read(path: str | os.PathLike[str], *, missing_edges: MissingEdges = "error") -> Observation | ActionModel:
+    """Read what was seen in one movie, or the model of an action, from a GraphML file.
 
     Which kind of file it is decides its root element: the thesis's dialect (A.2), or standard GraphML as
     :func:`write` makes it. Nothing that a file says is dropped: an element, attribute or text that the workbench does
@@ -37,8 +39,9 @@ def read(path: str | os.PathLike[str], *, missing_edges: MissingEdges = "error")
 
     Returns
     -------
-    Observation
-        Positions in the unit of the file; types of nodes as written. Names come from ``<ReplaceObject>`` (None for
+    Observation or ActionModel
+        A model if the file is one. Of an observation: positions in the unit of the file; types of nodes as
+        written. Names come from ``<ReplaceObject>`` (None for
         ``null``), otherwise from types that are known and the same in all key frames. A key frame without content was
         *not recorded*, its graph is None. Of two names for one segment the last counts, and a warning is logged.
 
@@ -64,27 +67,57 @@ def read(path: str | os.PathLike[str], *, missing_edges: MissingEdges = "error")
     """
     if missing_edges not in get_args(MissingEdges):
         raise ValueError(f"missing_edges: expected one of {get_args(MissingEdges)}, got {missing_edges!r}")
-    return _observation(read_whole(path, expected="a GraphML file"), path, missing_edges=missing_edges)
+    return _content(read_whole(path, expected="a GraphML file"), path, missing_edges=missing_edges)
 
 
-def write(path: str | os.PathLike[str], observation: Observation, *, dialect: Dialect = "thesis") -> None:
-    """Write what was seen in one movie as GraphML, whole or not at all; :func:`read` gives it back unchanged.
+def read_observation(path: str | os.PathLike[str], *, missing_edges: MissingEdges = "error") -> Observation:
+    """Read what was seen in one movie, see :func:`read`.
+
+    Raises
+    ------
+    UnusableFileError
+        If it is the file of a model, or as in :func:`read`.
+    """
+    seen = read(path, missing_edges=missing_edges)
+    if isinstance(seen, ActionModel):
+        raise UnusableFileError(f"{Path(path)}: expected what was seen in a movie, got the model of an action")
+    return seen
+
+
+def read_model(path: str | os.PathLike[str]) -> ActionModel:
+    """Read the model of an action, see :func:`read`.
+
+    Raises
+    ------
+    UnusableFileError
+        If it is the file of an observation, or as in :func:`read`.
+    """
+    model = read(path)
+    if isinstance(model, Observation):
+        raise UnusableFileError(f"{Path(path)}: expected the model of an action, got what was seen in a movie")
+    return model
+
+
+def write(path: str | os.PathLike[str], content: Observation | ActionModel, *, dialect: Dialect | None = None) -> None:
+    """Write what was seen in one movie, or a model, whole or not at all; :func:`read` gives it back unchanged.
 
     Parameters
     ----------
     path : path-like
         Where the file goes; its folder must exist.
-    observation : Observation
+    content : Observation or ActionModel
     dialect : {"thesis", "standard"}, optional
-        The dialect of A.2 (default), or standard GraphML, one graph a key frame, which graph programs open. Of several
+        The dialect of A.2 (default for an observation; it knows no models), or standard GraphML (always for a
+        model), one graph a key frame, which graph programs open. Of several
         graphs ``networkx.read_graphml`` gives the first; ``networkx.GraphMLReader()(path)`` goes through all of them.
 
     Raises
     ------
     TypeError
-        If it is no Observation.
+        If it is neither.
     ValueError
-        If the dialect is unknown, or a name cannot be written: it has control characters, or it is "null", which
+        If the dialect is unknown or knows no models, or a name cannot be written: it has control characters, or it is
+        "null", which
         means *no object* in the dialect of A.2.
     UnusableFileError
         If the file cannot be written.
@@ -100,12 +133,17 @@ def write(path: str | os.PathLike[str], observation: Observation, *, dialect: Di
     ...     read(Path(folder) / "chain.graphml").graphs[0].edges()
     [(1, 2, <Relation.TOUCHING: 2>)]
     """
-    if not isinstance(observation, Observation):
-        raise TypeError(f"expected an Observation, got {type(observation).__name__}")
-    if dialect not in get_args(Dialect):
+    if dialect is not None and dialect not in get_args(Dialect):
         raise ValueError(f"dialect: expected one of {get_args(Dialect)}, got {dialect!r}")
-    to_text = thesis_dialect.to_text if dialect == "thesis" else standard.to_text
-    write_whole(path, to_text(observation))
+    if isinstance(content, ActionModel):
+        if dialect == "thesis":
+            raise ValueError("dialect: expected 'standard' for a model, whose weights A.2 cannot say, got 'thesis'")
+        text = models.to_text(content)
+    elif isinstance(content, Observation):
+        text = standard.to_text(content) if dialect == "standard" else thesis_dialect.to_text(content)
+    else:
+        raise TypeError(f"expected an Observation or an ActionModel, got {type(content).__name__}")
+    write_whole(path, text)
 
 
 def read_chain(path: str | os.PathLike[str]) -> EventChain:
@@ -121,6 +159,7 @@ def read_chain(path: str | os.PathLike[str]) -> EventChain:
     Returns
     -------
     EventChain
+        Of a model, its chain.
 
     Raises
     ------
@@ -139,7 +178,9 @@ def read_chain(path: str | os.PathLike[str]) -> EventChain:
     data = read_whole(path, expected="a GraphML file or a table of relations")
     if not data.lstrip().startswith(_XML_BEGINNINGS):
         return chain_of_table(data, path)
-    observation = _observation(data, path, missing_edges="error")
+    observation = _content(data, path, missing_edges="error")
+    if isinstance(observation, ActionModel):
+        return observation.chain
     try:
         segments = len(observation.segments)
         if segments**2 * len(observation.graphs) > _MOST_CHAIN_ENTRIES:
@@ -149,7 +190,7 @@ def read_chain(path: str | os.PathLike[str]) -> EventChain:
         raise UnusableFileError(f"{Path(path)}: {error}") from error
 
 
-def _observation(data: bytes, path: str | os.PathLike[str], *, missing_edges: MissingEdges) -> Observation:
+def _content(data: bytes, path: str | os.PathLike[str], *, missing_edges: MissingEdges) -> Observation | ActionModel:
     file = Path(path)
     if not data:
         raise UnusableFileError(f"{file}: expected a GraphML file, but it is empty")
@@ -160,7 +201,11 @@ def _observation(data: bytes, path: str | os.PathLike[str], *, missing_edges: Mi
             source = "/".join(file.parts[-2:])
             return thesis_dialect.from_elements(root, children, missing_edges=missing_edges, source=source)
         if root.tag == standard.ROOT:
-            return standard.from_elements(root, children)
+            first = next(children, None)
+            if first is None:
+                return standard.from_elements(root, children)
+            reader = models.from_elements if models.is_model(first) else standard.from_elements
+            return reader(root, chained([first], children))
         raise ValueError(
             "expected <GraphML> (A.2) or <graphml> of standard GraphML as the root, "
             f"got <{local_name(root.tag)}>{'' if '}' in root.tag else ' of no namespace'}"

@@ -11,6 +11,7 @@ README = Path(__file__).parents[2] / "README.md"
 
 def test_commands_print_what_the_readme_shows(capsys, monkeypatch):
     monkeypatch.chdir(README.parent)
+    Path("build").mkdir(exist_ok=True)
     blocks = re.findall(
         r"^    \$ \.venv/bin/sec-lab (.+)\n((?:    .*\n|\n(?=    ))+)", README.read_text(), re.MULTILINE
     )

@@ -565,7 +565,7 @@ SEEN = Observation([SceneGraph([1, 2], [[0, 2], [2, 0]])], [4])
 
 
 def test_only_observations_are_written(file: Path) -> None:
-    with pytest.raises(TypeError, match="expected an Observation, got EventChain"):
+    with pytest.raises(TypeError, match="expected an Observation or an ActionModel, got EventChain"):
         sl.graphml.write(file, SEEN.chain)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="dialect: expected one of"):
         sl.graphml.write(file, SEEN, dialect="yed")  # type: ignore[arg-type]

@@ -116,7 +116,8 @@ def read_chains(folder: Path, *, setting: str) -> StoredChains:
         raise UnusableFileError(f"{path}: expected movies of the setting {setting!r}, got none")
     quality = table.loc[[f"{name}_{setting}" for name in names]].set_axis(names, axis=0).rename_axis("movie")
     pixels, truth = (
-        {name: documents.read(target / source / f"{name}_{setting}.graphml") for name in names} for source in SOURCES
+        {name: documents.read_observation(target / source / f"{name}_{setting}.graphml") for name in names}
+        for source in SOURCES
     )
     actions = {name: name.rpartition("_")[0].replace("_", " ") for name in names}
     return StoredChains(pixels, truth, actions, quality, target, setting)
