@@ -46,7 +46,8 @@ notebooks: setup  ## execute the notebooks in place and store their outputs
 
 chains: setup  ## observe the tabletop movies again, keep their chains, and execute the notebook that shows them
 	@$(BIN)/python -m sec_lab.worlds.tabletop.chains datasets/tabletop_actions --jobs 2
-	@$(BIN)/python tests/notebooks/execute.py notebooks/chapter2_2_real_actions.ipynb
+	@$(BIN)/python -m sec_lab.worlds.tabletop.chains datasets/put_and_take --jobs 2
+	@$(BIN)/python tests/notebooks/execute.py notebooks/chapter2_2_real_actions.ipynb notebooks/chapter2_3_learning.ipynb
 
 lint:
 	@$(BIN)/ruff check .

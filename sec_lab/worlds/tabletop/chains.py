@@ -155,17 +155,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def movies_in(folder: Path) -> list[Path]:
-    """Folders of complete movies, in the order of §2.3.
+    """Folders of complete movies, in the order of the thesis.
 
     Raises
     ------
     UnusableFileError
         If there is none.
     """
-    from sec_lab.worlds.tabletop.actions import ACTIONS, VERSIONS
+    from sec_lab.worlds.tabletop.actions import ALL_VERSIONS
     from sec_lab.worlds.tabletop.settings import SETTINGS
 
-    names = [f"{action}_{version}_{setting}" for setting in SETTINGS for action in ACTIONS for version in VERSIONS]
+    names = [
+        f"{action}_{version}_{setting}"
+        for setting in SETTINGS
+        for action, versions in ALL_VERSIONS.items()
+        for version in versions
+    ]
     found = [folder / name for name in names if (folder / name / "calibration.json").is_file()]
     if not found:
         raise UnusableFileError(f"{folder}: expected folders of movies, got none")

@@ -12,7 +12,9 @@ from sec_lab.recording import write_movie
 from sec_lab.worlds.tabletop.actions import Action, plan_movie
 from sec_lab.worlds.tabletop.camera import calibration, exposed
 from sec_lab.worlds.tabletop.contacts import contacts
+from sec_lab.worlds.tabletop.deeds import timed, write_deeds
 from sec_lab.worlds.tabletop.plan import Plan, segment_names
+from sec_lab.worlds.tabletop.put_and_take import PutOrTake
 from sec_lab.worlds.tabletop.scene import stage
 from sec_lab.worlds.tabletop.settings import Setting
 from sec_lab.worlds.tabletop.truth import Truth, write_truth
@@ -26,6 +28,8 @@ EYES = ("left", "right")
 
 def make_movie(folder: Path, plan: Plan, *, crf: float = CRF) -> Truth:
     """Render a plan and write ``left.mp4``, ``right.mp4``, ``truth.npz``, ``names.json`` and ``calibration.json``.
+
+    Where things are put on plates or taken from them, ``actions.json`` tells when.
 
     Parameters
     ----------
@@ -62,12 +66,20 @@ def make_movie(folder: Path, plan: Plan, *, crf: float = CRF) -> Truth:
         write_movie(folder / f"{name}.mp4", pictures, frames_per_second=FRAMES_PER_SECOND, crf=crf)
     truth = Truth(np.stack(labels), np.stack(depth), pairs, touching, segment_names(plan))
     write_truth(folder, truth)
+    if plan.deeds:
+        write_deeds(folder, timed(plan.deeds, truth.names, pairs, touching, truth.labels))
     write_whole(folder / "calibration.json", json.dumps(asdict(calibration(plan.camera)), indent=1) + "\n")
     return truth
 
 
 def make_movie_of(
-    folder: Path, action: Action, version: int, setting: Setting, *, seed: int, size_px: tuple[int, int] = (320, 256)
+    folder: Path,
+    action: Action | PutOrTake,
+    version: int,
+    setting: Setting,
+    *,
+    seed: int,
+    size_px: tuple[int, int] = (320, 256),
 ) -> Path:
     """Plan and render one movie into a folder of its own; see :func:`plan_movie` and :func:`make_movie`.
 

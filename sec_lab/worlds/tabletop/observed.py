@@ -68,6 +68,38 @@ def open_movie(folder: Path) -> Recording:
     return Recording.open(folder / "left.mp4", right=folder / "right.mp4", calibration=folder / "calibration.json")
 
 
+def film_strip(folder: Path, *, n_frames: int) -> list[NDArray[np.uint8]]:
+    """Frames of the left eye, evenly spaced over the time in which a hand is seen (Fig. 2.9, 2.11).
+
+    Parameters
+    ----------
+    folder : Path
+    n_frames : int
+        At least 2.
+
+    Returns
+    -------
+    list of (height, width, 3) uint8
+
+    Raises
+    ------
+    UnusableFileError
+        If a file is missing or damaged.
+    ValueError
+        If fewer than 2 are wanted, or no hand is ever seen.
+    """
+    if n_frames < 2:
+        raise ValueError(f"n_frames: expected at least 2, got {n_frames}")
+    true = read_truth(folder)
+    hands = [label for label, name in true.names.items() if name.endswith("hand")]
+    seen = np.flatnonzero(np.isin(true.labels, hands).any(axis=(1, 2)))
+    if not seen.size:
+        raise ValueError(f"folder: expected a movie in which a hand is seen, got {folder}")
+    wanted = np.linspace(seen[0], seen[-1], n_frames).round().astype(int).tolist()
+    pictures = {number: frame.image for number, frame in enumerate(Recording.open(folder / "left.mp4"))}
+    return [pictures[number] for number in wanted]
+
+
 def true_depth_m(true: Truth) -> NDArray[np.float32]:
     """True depth in metres, 0 where there is nothing."""
     return (true.depth_mm / np.float32(1000)).astype(np.float32)

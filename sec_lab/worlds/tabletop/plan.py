@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab.worlds.tabletop.camera import Camera, Sensor
+from sec_lab.worlds.tabletop.deeds import Deed
 from sec_lab.worlds.tabletop.lights import Lighting
 from sec_lab.worlds.tabletop.shapes import Floats, Shape
 
@@ -70,6 +71,8 @@ class Plan:
     sensor : Sensor
     seed : int
         Of the sensor's noise.
+    deeds : tuple of Deed, optional
+        What is put on plates and taken from them.
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Plan:
     lighting: Lighting
     sensor: Sensor
     seed: int
+    deeds: tuple[Deed, ...] = ()
 
     def __post_init__(self) -> None:
         lengths = {len(actor.form) for actor in self.actors}

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sec_lab.worlds.tabletop.deeds import Deed
 from sec_lab.worlds.tabletop.hand import Grip, hand_shape, skeleton
 from sec_lab.worlds.tabletop.plan import Actor, eased, pose
 from sec_lab.worlds.tabletop.shapes import Floats, Texture
@@ -23,11 +24,14 @@ class Act:
         Where the hands go.
     places_m : tuple of (n, 2 or 3) float64
         Where the things go.
+    deeds : tuple of Deed, optional
+        What is put on plates and taken from them.
     """
 
     actors: tuple[Actor, ...]
     path_m: Floats
     places_m: tuple[Floats, ...]
+    deeds: tuple[Deed, ...] = ()
 
 
 @dataclass(frozen=True)
