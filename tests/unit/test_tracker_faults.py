@@ -1,16 +1,30 @@
 """Tracks broken as trackers break them (chapter 3, beyond the thesis)."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from sec_lab.worlds.tabletop.faults import (
+    RATES,
+    REPEATS,
+    SEED,
+    fault_study,
+    judged,
+    main,
+    model_similarity,
+    observe_broken,
+)
+from sec_lab.worlds.tabletop.truth import Truth
 from sec_lab.worlds.tracker_faults import FAULTS, Fault, broken_tracks
 
 N = 30
+TABLES = Path(__file__).parents[2] / "datasets" / "tracker_faults"
 
 
 def movie() -> NDArray[np.uint8]:
@@ -90,3 +104,50 @@ def test_bad_input_is_refused() -> None:
         given = {"labels": movie(), "fault": "split", "per_hundred_frames": 1, **options}
         with pytest.raises(ValueError, match=says):
             broken_tracks(given.pop("labels"), given.pop("fault"), rng=rng, **given)
+
+
+def small_truth() -> Truth:
+    """A hand (3) comes to a box (4) on the table (1), and both leave."""
+    labels = np.full((40, 32, 48), 1, np.uint8)
+    depth = np.full(labels.shape, 900, np.uint16)
+    for t, frame in enumerate(labels):
+        left = 30 if t < 20 else min(30 + t - 20, 40)
+        frame[10:22, left : left + 8] = 4
+        if t >= 5:
+            hand = max(2, 22 - 2 * max(0, 12 - t)) + left - 30
+            frame[12:20, hand : hand + 8] = 3
+        depth[t][frame > 1] = 880
+    pairs = [(1, 3), (1, 4), (3, 4)]
+    return Truth(labels, depth, pairs, np.zeros((40, 3), bool), {1: "table", 3: "right hand", 4: "box"})
+
+
+def test_broken_tracks_are_observed_under_their_true_names() -> None:
+    whole, none = observe_broken(small_truth(), "vanish", per_hundred_frames=0, rng=np.random.default_rng(0))
+    assert none == 0
+    assert set(whole.names.values()) == {"table", "first hand", "box"}
+    perfect = judged(whole, whole, {"put_1_laboratory": whole.chain})
+    assert (perfect["similarity"], perfect["nearest"]) == (100.0, "put_1_laboratory")
+    swapped, n = observe_broken(small_truth(), "swap", per_hundred_frames=8, rng=np.random.default_rng(0))
+    assert n > 0
+    assert set(swapped.names) == set(swapped.segments.tolist())
+    assert set(swapped.names.values()) <= {"table", "first hand", "box"}
+    assert judged(swapped, whole, {})["nearest"] == ""
+    assert model_similarity([whole.chain] * 2, [whole.chain] * 2) == 100.0
+
+
+def test_stored_tables_are_complete_and_a_part_of_them_comes_out_again() -> None:
+    movies, models = (pd.read_csv(TABLES / f"{name}.csv") for name in ("movies", "models"))
+    assert len(movies) == 16 * (1 + len(FAULTS) * len(RATES) * REPEATS)
+    assert len(models) == 4 * len(FAULTS) * len(RATES) * REPEATS
+    assert not movies.drop(columns="nearest").isna().any(axis=None)
+    two = ["opening_book_1_laboratory", "opening_book_2_laboratory"]
+    anew, _ = fault_study(TABLES.parent / "tabletop_actions", movies=two, rates=RATES[:1], repeats=1, seed=SEED)
+    keys = ["movie", "fault", "rate", "repeat", "n_faults", "rows", "columns", "similarity", "roles_percent"]
+    assert len(anew[keys].merge(movies[keys])) == len(anew) == 2 * (1 + len(FAULTS))
+
+
+def test_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as error:
+        main([str(tmp_path), str(tmp_path)])
+    assert error.value.code == 2
+    assert "expected folders of movies, got none" in capsys.readouterr().err
