@@ -35,14 +35,14 @@ def broken_tracks(
         Segment of every pixel, 0 where there is none.
     fault : {"split", "vanish", "swap", "flicker"}
         ``"split"``: the half of a segment beyond its middle, across its longer side, gets a label of its own for
-        ``duration`` frames. ``"vanish"``: a segment is unlabelled (0) for ``duration`` frames. ``"swap"``: two segments
-        exchange their labels for good. ``"flicker"``: for ``duration`` frames, a segment grows over its neighbours in
-        every other frame by ``border_px`` and shrinks as much, into the nothing, in the others.
+        ``duration`` frames. ``"vanish"``: a segment is taken for background for ``duration`` frames. ``"swap"``: two
+        segments exchange their labels for good. ``"flicker"``: for ``duration`` frames, a segment grows over its
+        neighbours in every other frame by ``border_px`` and leaves as much of itself to the background in the others.
     per_hundred_frames : float
         Expected faults of a segment that is there for a hundred frames, 0 to 100.
     rng : numpy.random.Generator
     background : int, optional
-        Label that is left alone.
+        Label that suffers no fault, and takes what is lost.
     duration, border_px : int, optional
         Frames and pixels, at least 1.
 
@@ -92,12 +92,12 @@ def broken_tracks(
             _swap(broken[t:], label, others[int(rng.integers(len(others)))])
             last = t + 1
         elif fault == "vanish":
-            broken[t:last][broken[t:last] == label] = 0
+            broken[t:last][broken[t:last] == label] = background
         elif fault == "split":
             _split(broken[t:last], label, fresh)
             fresh += 1
         else:
-            _flicker(broken[t:last], label, border_px)
+            _flicker(broken[t:last], label, border_px, background)
         busy_until[label] = last
         n_faults += 1
     return broken, n_faults
@@ -117,11 +117,11 @@ def _split(frames: Labels, label: int, fresh: int) -> None:
             frame[tuple(beyond.T)] = fresh
 
 
-def _flicker(frames: Labels, label: int, border_px: int) -> None:
+def _flicker(frames: Labels, label: int, border_px: int, background: int) -> None:
     element = np.ones((2 * border_px + 1,) * 2, np.uint8)
     for step, frame in enumerate(frames):
         mask: NDArray[Any] = (frame == label).astype(np.uint8)
         if step % 2 == 0:
             frame[cv2.dilate(mask, element) > 0] = label
         else:
-            frame[(mask > 0) & (cv2.erode(mask, element) == 0)] = 0
+            frame[(mask > 0) & (cv2.erode(mask, element) == 0)] = background

@@ -54,15 +54,17 @@ def test_figure_3_4_with_samples_and_roles(benchmark: BenchmarkFixture) -> None:
 
 def test_ten_thousand_samples_a_point(benchmark: BenchmarkFixture) -> None:
     """Fig. 3.2, 3.4 and 3.5 with 10,000 samples a point: 1.1 million comparisons."""
-    benchmark.pedantic(both_modes, args=(10_000, {"3×5": LIFTING, **SEEDS}), rounds=1, warmup_rounds=0)
+    n = 100 if benchmark.disabled else 10_000
+    benchmark.pedantic(both_modes, args=(n, {"3×5": LIFTING, **SEEDS}), rounds=1, warmup_rounds=0)
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_hundred_models_a_point(benchmark: BenchmarkFixture, mode: str) -> None:
     """Fig. 3.6 with 100 models of 100 samples a point: 4,400 models."""
+    n = 1 if benchmark.disabled else 100
 
     def learn_all() -> None:
-        model_study(SEEDS, rng=np.random.default_rng(0), n_models=100, noise=MODES[mode], n_jobs=2)
+        model_study(SEEDS, rng=np.random.default_rng(0), n_models=n, noise=MODES[mode], n_jobs=2)
 
     benchmark.pedantic(learn_all, rounds=1, warmup_rounds=0)
 
@@ -79,6 +81,4 @@ def test_training_the_network(benchmark: BenchmarkFixture) -> None:
     with pytest.warns(match="Maximum iterations"):
         theirs = 100 * seconds(lambda: other.fit(chain_vectors(chains), wanted))
     ours = seconds(lambda: ThesisNetwork(random_state=0).fit(chains, names))
-    print(
-        f"\ntraining: {ours:.2f} s, scikit-learn {theirs:.1f} s (10 epochs × 100), {theirs / ours:.0f} times"
-    )
+    print(f"\ntraining: {ours:.2f} s, scikit-learn {theirs:.1f} s (10 epochs × 100), {theirs / ours:.0f} times")

@@ -58,7 +58,7 @@ def observe_broken(
     pictures = np.zeros((*labels.shape, 3), np.uint8)
     seen = observe(Recording.from_frames(pictures, depth=true_depth_m(true)), segmentation=segmentation)
     # Label images stay behind: hundreds of them would not fit into memory.
-    names = {segment: names[segment] for segment in seen.segments.tolist()}
+    names = {segment: names[segment] for segment in seen.segments.tolist() if segment in names}
     return Observation(seen.graphs, seen.key_frames, names, "px"), n_faults
 
 
@@ -77,12 +77,15 @@ def judged(broken: Observation, whole: Observation, others: Mapping[str, EventCh
     dict of str to float or str
         ``similarity`` with the whole chain in percent; ``roles_percent``: the share of the things in changing rows of
         the whole chain whose counterpart (§2.8) is the same thing, where ties do not count; and the ``nearest`` other
-        movie, all without the table, with which few of these movies are recognised; empty if nothing is left.
+        movie, without the table, with which few of these movies are recognised. If nothing changes any more, both
+        numbers are 0 and nothing is nearest.
     """
     from sec_lab.roles import corresponding_segments
     from sec_lab.similarity import compare
 
     chain, ideal = broken.chain, whole.chain
+    if not len(chain.changing_rows):
+        return {"similarity": 0.0, "nearest": "", "roles_percent": 0.0}
     own = compare(ideal, chain, tolerance_percent=TOLERANCE_PERCENT)
     things = np.unique(ideal.pairs[ideal.changing_rows]).tolist()
     partners = corresponding_segments(own, on_tie="omit")
@@ -129,7 +132,14 @@ def model_similarity(broken: Sequence[EventChain], whole: Sequence[EventChain]) 
 
 
 def fault_study(
-    folder: Path, *, movies: Sequence[str], rates: Sequence[float], repeats: int, seed: int, n_jobs: int | None = None
+    folder: Path,
+    *,
+    movies: Sequence[str],
+    rates: Sequence[float],
+    repeats: int,
+    seed: int,
+    faults: Sequence[Fault] = FAULTS,
+    n_jobs: int | None = None,
 ) -> tuple["pd.DataFrame", "pd.DataFrame"]:
     """Break all movies at all rates in all ways.
 
@@ -143,6 +153,8 @@ def fault_study(
         Faults of a segment in a hundred frames; rate 0 is added as the reference.
     repeats, seed : int
         How often, and the seed of all random numbers.
+    faults : sequence of str, optional
+        Kinds of faults.
     n_jobs : int, optional
         As in :class:`joblib.Parallel`.
 
@@ -156,7 +168,7 @@ def fault_study(
     from tqdm import tqdm
 
     # Random numbers of its own for every movie, rate and repeat: leaving some out leaves the others as they are.
-    tasks = [(folder / name, tuple(rates), repeats, [seed, _number_of(name)]) for name in movies]
+    tasks = [(folder / name, tuple(faults), tuple(rates), repeats, [seed, _number_of(name)]) for name in movies]
     run = Parallel(n_jobs=n_jobs, return_as="generator")(delayed(_broken_chains)(*task) for task in tasks)
     found = dict(zip(movies, tqdm(run, total=len(tasks), unit="movie", disable=not sys.stderr.isatty()), strict=True))
     whole = {name: chains.pop(("none", 0.0, 0))[0] for name, chains in found.items()}
@@ -205,16 +217,16 @@ def _number_of(movie: str) -> int:
 
 
 def _broken_chains(
-    folder: Path, rates: Sequence[float], repeats: int, seed: list[int]
+    folder: Path, faults: Sequence[Fault], rates: Sequence[float], repeats: int, seed: list[int]
 ) -> dict[tuple[str, float, int], tuple[Observation, int]]:
     true = read_truth(folder)
     none = np.random.default_rng(0)
     seen, _ = observe_broken(true, "split", per_hundred_frames=0.0, rng=none)
     seen_in = {("none", 0.0, 0): (seen, 0)}
-    for f, fault in enumerate(FAULTS):
+    for fault in faults:
         for rate in rates:
             for repeat in range(repeats):
-                rng = np.random.default_rng([*seed, f, round(100 * rate), repeat])
+                rng = np.random.default_rng([*seed, FAULTS.index(fault), round(100 * rate), repeat])
                 broken, n_faults = observe_broken(true, fault, per_hundred_frames=rate, rng=rng)
                 seen_in[fault, rate, repeat] = broken, n_faults
     return seen_in
