@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from sec_lab.baselines import ThesisNetwork
 from sec_lab.event_chain import EventChain
 from sec_lab.finding import find_actions
 from sec_lab.learning import learn
+from sec_lab.noise import compare_with_seed, noisy_samples
 from sec_lab.recording import Recording
 from sec_lab.relations import scan_lines, steady_relations
 from sec_lab.segmentation import lattice_energy, track_segments, warp_labels
@@ -44,6 +46,8 @@ def warm() -> None:
     permutations(compare(chain, chain))
     pairwise_similarity([chain, chain])
     find_actions({"all": learn([chain, chain])}, chain)
+    compare_with_seed(noisy_samples(chain, 0.5, n_samples=2, rng=np.random.default_rng(0)))
+    ThesisNetwork(n_inputs=6, epochs=1).fit([chain, chain], [0, 1]).predict([chain])
     learn([chain, chain], mode="online")
 
 

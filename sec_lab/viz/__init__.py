@@ -18,6 +18,11 @@ from sec_lab.viz.gallery import draw_gallery as draw_gallery
 from sec_lab.viz.gallery import graph_at as graph_at
 from sec_lab.viz.match import draw_match as draw_match
 from sec_lab.viz.moments import draw_moments as draw_moments
+from sec_lab.viz.noise import draw_levels as draw_levels
+from sec_lab.viz.noise import draw_models as draw_models
+from sec_lab.viz.noise import draw_network as draw_network
+from sec_lab.viz.noise import draw_positives as draw_positives
+from sec_lab.viz.noise import draw_precision_recall as draw_precision_recall
 from sec_lab.viz.roles import RoleStrip as RoleStrip
 from sec_lab.viz.roles import draw_roles as draw_roles
 from sec_lab.viz.scene import draw_segments as draw_segments
