@@ -94,7 +94,7 @@ def build(scene: Scene, *, meshcat: "Meshcat | None" = None, render: bool = True
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, graph, meshcat)
     _let_arm_alone(plant, graph)
-    return Bench(builder.Build(), plant, graph, owner_of, _arm_alone())
+    return Bench(builder.Build(), plant, graph, owner_of, arm_alone())
 
 
 class Eye:
@@ -151,7 +151,8 @@ def _add_arm(plant: "MultibodyPlant") -> None:
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
 
 
-def _arm_alone() -> "MultibodyPlant":
+def arm_alone() -> "MultibodyPlant":
+    """The arm without table and things."""
     from pydrake.multibody.plant import MultibodyPlant
 
     arm = MultibodyPlant(time_step=0.0)

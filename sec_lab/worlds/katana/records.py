@@ -276,8 +276,8 @@ class Truth:
     Parameters
     ----------
     contacts : mapping of pair of str to (n,) bool array
-        Whether two named things, the arm's tip or the table pressed on each other, frame by frame; names in the order
-        of the alphabet.
+        Whether two named things or the arm's tip pressed on each other or were nearer than half a millimetre, or one
+        pressed on the table, frame by frame; names in the order of the alphabet.
     tip_m : (n, 3) float64
         Of the tip, in the world.
     wanted_tip_m : (n, 3) float64
@@ -313,7 +313,13 @@ class Truth:
             array.setflags(write=False)
 
     def touching(self, one: str, other: str) -> NDArray[np.bool_]:
-        """Whether two pressed on each other, frame by frame; (n,) bool."""
+        """Whether two touched, frame by frame; (n,) bool.
+
+        Raises
+        ------
+        ValueError
+            If there is no such pair.
+        """
         pair = (one, other) if one <= other else (other, one)
         if pair not in self.contacts:
             raise ValueError(f"pair: expected one of {sorted(self.contacts)}, got {pair}")

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from sec_lab.recording import Recording
 from sec_lab.worlds.katana.bench import STEP_S, Bench, Eye, build
 from sec_lab.worlds.katana.film import Film
-from sec_lab.worlds.katana.kinematics import joint_angles, tip_position
+from sec_lab.worlds.katana.inverse import solved_joint_angles
+from sec_lab.worlds.katana.kinematics import UnreachableError, hand_axes, joint_angles, tip_position
 from sec_lab.worlds.katana.paths import FINGER_RAD, LOW_M, Path, path_of
 from sec_lab.worlds.katana.records import ARM, TABLE, Fault, Floats, Gripper, Move, Scene, Thing, Truth, View
 
@@ -19,9 +20,11 @@ if TYPE_CHECKING:
 FRAMES_PER_SECOND = 20.0
 _STEPS_A_FRAME = round(1 / FRAMES_PER_SECOND / STEP_S)
 _REST_S = 0.4
+_AGREEMENT_RAD = 1e-3
+_HAIR_M = 0.0005
 _FAR_AWAY_M = (3.0, 0.0, -2.0)
-_SLIP_S, _SLIP_WEIGHTS = 0.28, 1.6
-"""For how long, and with how many times its weight, a thing is drawn aside."""
+_SLIP_M, _SLIP_WEIGHTS = 0.06, 2.0
+"""How far, and with how many times its weight, a thing is drawn aside; it slides on from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +93,16 @@ class Run:
         self._film = Film((scene.camera.height, scene.camera.width), FRAMES_PER_SECOND)
         self._labels = labels and film
         self._owner_of_geometry = _owners(self._bench)
+        parts = [(geometry, name) for geometry, name in self._owner_of_geometry.items() if name != TABLE]
+        self._pairs = [
+            (one, other)
+            for place, (one, name) in enumerate(parts)
+            for other, other_name in parts[place + 1 :]
+            if name != other_name
+        ]
         self._fault: Fault | None = fault
+        self._drawn: tuple[str, Floats] | None = None
+        self._wanted: Floats | None = None
         self._offset = np.zeros(3)
         self._was_low = False
         self._moments: list[_Moment] = []
@@ -154,7 +166,7 @@ class Run:
 
     def check(self, move: Move) -> None:
         """Nothing, or UnreachableError with the reason; see :func:`~sec_lab.execution.motion.check_plan` for plans."""
-        path_of(self._q, move, step_s=STEP_S)
+        self._path(move)
 
     def move(self, move: Move) -> None:
         """Make one move, filming, and rest a little.
@@ -174,7 +186,7 @@ class Run:
         if offset.any() and self._was_low and move.to_m[2] >= LOW_M:
             offset = np.zeros(3)
         x, y, z = (float(value) for value in np.asarray(move.to_m) + offset)
-        path = path_of(self._q, replace(move, to_m=(x, y, z)), step_s=STEP_S)
+        path = self._path(replace(move, to_m=(x, y, z)))
         self._offset = offset
         self._was_low = move.to_m[2] < LOW_M and bool(offset.any())
         if fault is not None:
@@ -187,6 +199,17 @@ class Run:
         n = max(round(seconds / STEP_S), 0)
         tip = tip_position(self._q[:5])
         self._follow(Path(np.repeat(self._q[None], n, axis=0), np.repeat(tip[None], n, axis=0), 0), None)
+
+    def _path(self, move: Move) -> Path:
+        """Path in closed form, its end confirmed by the solver, which knows the arm from its description only."""
+        path = path_of(self._q, move, step_s=STEP_S)
+        if path.n_motion:
+            end = path.q_rad[path.n_motion - 1, :5]
+            near = path.q_rad[3 * path.n_motion // 4, :5]
+            solved = solved_joint_angles(path.tip_m[path.n_motion - 1], *hand_axes(end), guess_rad=near)
+            if np.abs(solved - end).max() > _AGREEMENT_RAD:
+                raise UnreachableError(f"{move.to_m} m: closed form and solver disagree: {end} and {solved} rad")
+        return path
 
     def _follow(self, path: Path, fault: Fault | None) -> None:
         n = len(path.q_rad)
@@ -207,15 +230,14 @@ class Run:
             self._command(q[step], v[step], a[step])
             self._steps += 1
             self._simulator.AdvanceTo(self._steps * STEP_S)
-            if self._until is not None and self._steps >= self._until:
-                self._push_thing(None, np.zeros(3))
+            if self._drawn is not None:
+                name, place = self._drawn
+                if np.linalg.norm(self._poses()[name][:2, 3] - place) > _SLIP_M:
+                    self._push_thing(None, np.zeros(3))
             if self._steps % _STEPS_A_FRAME == 0:
                 self._wanted = tips[step - 1]
                 self._look()
         self._q = path.q_rad[-1].copy()
-
-    _until: int | None = None
-    _wanted: Floats | None = None
 
     def _command(self, q: Any, v: Any, a: Any) -> None:
         """Wanted angles for the joints' own control, and the torques that carry the arm and make it move."""
@@ -263,6 +285,12 @@ class Run:
             surface = results.hydroelastic_contact_info(number).contact_surface()
             geometries.append((surface.id_M(), surface.id_N()))
         owner = self._owner_of_geometry
+        graph = self._bench.graph
+        query: Any = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._context))
+        # What a thing was pushed against springs back by less than a hair, and still touches.
+        for one, other in self._pairs:
+            if query.ComputeSignedDistancePairClosestPoints(one, other).distance <= _HAIR_M:
+                geometries.append((one, other))
         found = set()
         for one, other in geometries:
             if one in owner and other in owner and owner[one] != owner[other]:
@@ -292,13 +320,13 @@ class Run:
             body = self._bench.plant.GetBodyByName(str(fault.thing))
             weight = 9.81 * body.default_mass()
             self._push_thing(str(fault.thing), _SLIP_WEIGHTS * weight * aside)
-            self._until = self._steps + round(_SLIP_S / STEP_S)
+            self._drawn = str(fault.thing), self._poses()[str(fault.thing)][:2, 3].copy()
 
     def _push_thing(self, name: str | None, force_n: NDArray[np.float64]) -> None:
         from pydrake.multibody.math import SpatialForce
         from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 
-        self._until = None
+        self._drawn = None
         forces = []
         if name is not None:
             applied = ExternallyAppliedSpatialForce()
