@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ class Film:
     size : tuple of int
         (height, width).
     frames_per_second : float
+    level : int, optional
+        Of compression, 1 (fast) to 9 (small).
 
     Examples
     --------
@@ -30,9 +33,10 @@ class Film:
     [(0.0, 7, 1.0)]
     """
 
-    def __init__(self, size: tuple[int, int], frames_per_second: float) -> None:
+    def __init__(self, size: tuple[int, int], frames_per_second: float, *, level: int = 2) -> None:
         self.size = size
         self.frames_per_second = frames_per_second
+        self.level = level
         self.packed: list[bytes] = []
         self.packed_labels: list[bytes] = []
         self._last = np.zeros(0, dtype=np.uint8)
@@ -55,11 +59,11 @@ class Film:
         """
         tenths = np.round(depth_m * _TENTHS_MM).astype("<u2")
         flat = np.concatenate([image.ravel(), np.ascontiguousarray(tenths).view(np.uint8).ravel()])
-        self.packed.append(_packed(flat, self._last))
+        self.packed.append(_packed(flat, self._last, level=self.level))
         self._last = flat
         if labels is not None:
             flat = labels.ravel()
-            self.packed_labels.append(_packed(flat, self._last_labels))
+            self.packed_labels.append(_packed(flat, self._last_labels, level=self.level))
             self._last_labels = flat
 
     def recording(self) -> Recording:
@@ -78,18 +82,19 @@ class Film:
             return None
         return np.stack([flat.reshape(self.size) for flat in _unpacked(self.packed_labels)])
 
-    def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """All of it, as it goes into a file of numpy; :func:`film_of` reads it."""
-        packed, lengths = _joined(self.packed)
-        labels, label_lengths = _joined(self.packed_labels)
-        return {
-            "film": packed,
-            "film_lengths": lengths,
-            "film_labels": labels,
-            "film_label_lengths": label_lengths,
-            "size": np.array(self.size),
-            "frames_per_second": np.array(self.frames_per_second),
-        }
+
+def film_arrays(film: Film) -> dict[str, NDArray[Any]]:
+    """All of a film, as it goes into a file of numpy; :func:`film_of` reads it."""
+    packed, lengths = _joined(film.packed)
+    labels, label_lengths = _joined(film.packed_labels)
+    return {
+        "film": packed,
+        "film_lengths": lengths,
+        "film_labels": labels,
+        "film_label_lengths": label_lengths,
+        "size": np.array(film.size),
+        "frames_per_second": np.array(film.frames_per_second),
+    }
 
 
 def film_of(path: Path) -> Film:
@@ -115,8 +120,8 @@ def _frames(packed: tuple[bytes, ...], size: tuple[int, int], frames_per_second:
         yield Frame(index, flat[: 3 * n].reshape(height, width, 3), index / frames_per_second, depth_m=depth)
 
 
-def _packed(flat: NDArray[np.uint8], last: NDArray[np.uint8]) -> bytes:
-    return zlib.compress((flat - last if last.size else flat).tobytes(), 2)
+def _packed(flat: NDArray[np.uint8], last: NDArray[np.uint8], *, level: int) -> bytes:
+    return zlib.compress((flat - last if last.size else flat).tobytes(), level)
 
 
 def _unpacked(packed: tuple[bytes, ...] | list[bytes]) -> Iterator[NDArray[np.uint8]]:
