@@ -13,9 +13,13 @@ from sec_lab.event_chain import event_chain as event_chain
 
 if TYPE_CHECKING:
     import sec_lab.graphml as graphml
+    from sec_lab.action_model import ActionModel as ActionModel
     from sec_lab.classification import unsupervised_classes as unsupervised_classes
     from sec_lab.codes import Relation as Relation
     from sec_lab.event_chain import EventChain as EventChain
+    from sec_lab.learning import OnlineLearner as OnlineLearner
+    from sec_lab.learning import learn as learn
+    from sec_lab.learning import learn_types as learn_types
     from sec_lab.observation import Observation as Observation
     from sec_lab.pipeline import observe as observe
     from sec_lab.pipeline import observe_segments as observe_segments
@@ -32,16 +36,20 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _ROOM_OF = {
+    "ActionModel": "action_model",
     "AmbiguousRoleError": "roles",
     "EventChain": "event_chain",
     "Match": "similarity",
     "Observation": "observation",
+    "OnlineLearner": "learning",
     "Recording": "recording",
     "Relation": "codes",
     "SceneGraph": "scene_graph",
     "Segmentation": "segmentation",
     "compare": "similarity",
     "corresponding_segments": "roles",
+    "learn": "learning",
+    "learn_types": "learning",
     "main_graphs": "scene_graph",
     "observe": "pipeline",
     "observe_segments": "pipeline",

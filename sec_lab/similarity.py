@@ -143,7 +143,7 @@ def compare(
     one-to-one alignments (LCS). Rows that never change drop out of the temporal step too (Table 2.2), and rows without
     any similarity (0 %) never correspond, whatever the tolerance.
     """
-    _check_options(normalizer, tolerance_percent, temporal_input, effort)
+    check_options(normalizer, tolerance_percent, temporal_input, effort)
     packed = PackedChains([a, b], ["first chain", "second chain"], derived=temporal_input == "derived")
     (m, k), (u, v) = packed.n_rows.tolist(), packed.n_columns.tolist()
     symbols = [packed.symbols_of(row) for row in range(m + k)]
@@ -234,7 +234,7 @@ def pairwise_similarity(
     for measure in measures:
         if measure not in get_args(Measure):
             raise ValueError(f"measures: expected {get_args(Measure)}, got {measure!r}")
-    _check_options(normalizer, tolerance_percent, temporal_input, effort)
+    check_options(normalizer, tolerance_percent, temporal_input, effort)
     packed = PackedChains(chains, [f"chain {i}" for i in range(len(chains))], derived=temporal_input == "derived")
     n = len(chains)
     spatial, temporal = (np.empty((n, n) if name in measures else (0, 0)) for name in ("spatial", "temporal"))
@@ -310,7 +310,7 @@ def similarity_table(
         raise ValueError(f"direction: expected one of {get_args(Direction)}, got {direction!r}")
     if measure not in get_args(Measure):
         raise ValueError(f"measure: expected one of {get_args(Measure)}, got {measure!r}")
-    _check_options(normalizer, tolerance_percent, temporal_input, effort)
+    check_options(normalizer, tolerance_percent, temporal_input, effort)
     names = list(chains) if isinstance(chains, Mapping) else list(range(len(chains)))
     values = list(chains.values()) if isinstance(chains, Mapping) else list(chains)
     packed = PackedChains(values, [f"chain {name}" for name in names], derived=temporal_input == "derived")
@@ -463,7 +463,13 @@ def _spread_over_identical_rows(classes: NDArray[np.int64], first: NDArray[np.in
     return np.array([next(members[c]) if c >= 0 else -1 for c in classes.tolist()], np.int64)
 
 
-def _check_options(normalizer: str, tolerance_percent: float, temporal_input: str, effort: int) -> None:
+def check_options(normalizer: str, tolerance_percent: float, temporal_input: str, effort: int) -> None:
+    """Refuse options of :func:`compare` that are unknown or out of range.
+
+    Raises
+    ------
+    ValueError
+    """
     if normalizer not in get_args(Normalizer):
         raise ValueError(f"normalizer: expected one of {get_args(Normalizer)}, got {normalizer!r}")
     if temporal_input not in get_args(TemporalInput):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from sec_lab.event_chain import EventChain
+from sec_lab.learning import learn
 from sec_lab.recording import Recording
 from sec_lab.relations import scan_lines, steady_relations
 from sec_lab.segmentation import lattice_energy, track_segments, warp_labels
@@ -41,6 +42,8 @@ def warm() -> None:
     chain = EventChain([[0, 2, 0], [0, 0, 2]], [(1, 2), (2, 3)])
     permutations(compare(chain, chain))
     pairwise_similarity([chain, chain])
+    learn([chain, chain])
+    learn([chain, chain], mode="online")
 
 
 if __name__ == "__main__":
