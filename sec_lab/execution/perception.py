@@ -40,6 +40,7 @@ STEADY_S = 0.2
 """For how long a change must last to count; it is dated to the frame in which it began."""
 
 _FAR_M = 0.05
+_PART_SHARE = 0.3
 _JUMP_M = 0.02
 _RESTING_FRAMES = 5
 
@@ -59,8 +60,11 @@ class SeenThing:
         Corners of the convex hull of these points, seen from above, anticlockwise.
     centre_m : (3,) float64
         Middle of the footprint, at half the height.
-    top_m : float
-        Height above the table.
+    top_m, bottom_m : float
+        Highest and lowest that is seen of it, above the table.
+    n_parts : int
+        Parts in the picture that are not much smaller than the largest: more than one where several things have the
+        colour, or something hides the middle.
     """
 
     name: str
@@ -69,6 +73,8 @@ class SeenThing:
     footprint_m: Floats
     centre_m: Floats
     top_m: float
+    bottom_m: float
+    n_parts: int
 
     def __post_init__(self) -> None:
         for array in (self.points_m, self.footprint_m, self.centre_m):
@@ -92,6 +98,19 @@ class Perceived:
     observation: Observation
     chain: EventChain | None
     gaps_m: dict[tuple[str, str], Floats]
+
+    def last_gap_m(self, one: str, other: str) -> float:
+        """Gap between two things as it was seen last, the median of a few frames.
+
+        Raises
+        ------
+        ValueError
+            If there is no such pair.
+        """
+        for pair, gaps in self.gaps_m.items():
+            if set(pair) == {one, other}:
+                return float(np.median(gaps[-_RESTING_FRAMES:]))
+        raise ValueError(f"pair: expected one of {sorted(self.gaps_m)}, got {(one, other)}")
 
 
 class Watcher:
@@ -260,11 +279,13 @@ def things_in(
         if counts[label] < MINIMUM_PX:
             continue
         if colour.name == TABLE:
-            found.append(SeenThing(TABLE, label, np.zeros((0, 3)), np.zeros((0, 2)), _middle_of_table(camera), 0.0))
+            found.append(
+                SeenThing(TABLE, label, np.zeros((0, 3)), np.zeros((0, 2)), _middle_of_table(camera), 0.0, 0.0, 1)
+            )
             continue
         where = np.nonzero(labels == label)
         points = rays[where] * frame.depth_m[where][:, None].astype(np.float64) + camera.X_WC[:3, 3]
-        found.append(_seen(colour.name, label, points))
+        found.append(_seen(colour.name, label, points, _n_parts(labels == label)))
     return tuple(found)
 
 
@@ -318,22 +339,37 @@ def _has_contact_change(row: NDArray[np.uint8]) -> bool:
     return any({a, b} == {"N", "T"} for a, b in pairwise(letters))
 
 
-def _seen(name: str, label: int, points: Floats) -> SeenThing:
+def _seen(name: str, label: int, points: Floats, n_parts: int) -> SeenThing:
     footprint = _hull(points[:, :2])
     middle = _centroid(footprint)
     # Single pixels on the rim may show what lies behind.
-    top = float(np.percentile(points[:, 2], 99))
-    return SeenThing(name, label, points, footprint, np.array([middle[0], middle[1], top / 2]), top)
+    bottom, top = (float(height) for height in np.percentile(points[:, 2], (1, 99)))
+    centre = np.array([middle[0], middle[1], top / 2])
+    return SeenThing(name, label, points, footprint, centre, top, bottom, n_parts)
+
+
+def _n_parts(mask: NDArray[np.bool_]) -> int:
+    from scipy.ndimage import find_objects, label
+
+    (box,) = find_objects(mask.astype(np.uint8))
+    parts, n = label(mask[box], structure=np.ones((3, 3)))
+    if n == 1:
+        return 1
+    sizes = np.bincount(parts.ravel())[1:]
+    return int(np.count_nonzero(sizes >= _PART_SHARE * sizes.max()))
 
 
 def _on_the_rim(labels: NDArray[np.uint16], depth_m: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Pixels with the colour of one thing and the range of what lies behind it: farther than one beside of the same."""
+    """Pixels that may have the colour of one thing and the range of another: far from one beside of the same label."""
     rim = np.zeros(labels.shape, dtype=np.bool_)
-    for axis in (0, 1):
-        for here, there in ((np.s_[1:], np.s_[:-1]), (np.s_[:-1], np.s_[1:])):
-            own = (here, np.s_[:]) if axis == 0 else (np.s_[:], here)
-            beside = (there, np.s_[:]) if axis == 0 else (np.s_[:], there)
-            rim[own] |= (labels[own] == labels[beside]) & (depth_m[own] - depth_m[beside] > _JUMP_M)
+    height, width = labels.shape
+    # All eight neighbours, as a segment may hang together over corners.
+    for down, right in ((0, 1), (1, -1), (1, 0), (1, 1)):
+        one = np.s_[down:, max(right, 0) : width + min(right, 0)]
+        other = np.s_[: height - down, max(-right, 0) : width + min(-right, 0)]
+        torn = (labels[one] == labels[other]) & (np.abs(depth_m[one] - depth_m[other]) > _JUMP_M)
+        rim[one] |= torn
+        rim[other] |= torn
     return rim
 
 

@@ -24,6 +24,8 @@ class Film:
     frames_per_second : float
     level : int, optional
         Of compression, 1 (fast) to 9 (small).
+    keep : bool, optional
+        Keep pictures as they are until :meth:`latest` hands them out.
 
     Examples
     --------
@@ -33,10 +35,12 @@ class Film:
     [(0.0, 7, 1.0)]
     """
 
-    def __init__(self, size: tuple[int, int], frames_per_second: float, *, level: int = 2) -> None:
+    def __init__(self, size: tuple[int, int], frames_per_second: float, *, level: int = 2, keep: bool = False) -> None:
         self.size = size
         self.frames_per_second = frames_per_second
-        self.level = level
+        self.level, self.keep = level, keep
+        self._kept: list[Frame] = []
+        self._kept_from = 0
         self.packed: list[bytes] = []
         self.packed_labels: list[bytes] = []
         self._last = np.zeros(0, dtype=np.uint8)
@@ -61,10 +65,32 @@ class Film:
         flat = np.concatenate([image.ravel(), np.ascontiguousarray(tenths).view(np.uint8).ravel()])
         self.packed.append(_packed(flat, self._last, level=self.level))
         self._last = flat
+        if self.keep:
+            number = len(self.packed) - 1
+            depth = tenths.astype(np.float32) / np.float32(_TENTHS_MM)
+            self._kept.append(Frame(number, image, number / self.frames_per_second, depth_m=depth))
         if labels is not None:
             flat = labels.ravel()
             self.packed_labels.append(_packed(flat, self._last_labels, level=self.level))
             self._last_labels = flat
+
+    def latest(self, first: int) -> tuple[Frame, ...]:
+        """Frames from a number on; those before it are not to be asked for again.
+
+        Parameters
+        ----------
+        first : int
+
+        Raises
+        ------
+        ValueError
+            If they were asked for before.
+        """
+        if first < self._kept_from:
+            raise ValueError(f"first: expected at least {self._kept_from}, got {first}")
+        frames = tuple(self._kept[first - self._kept_from :])
+        self._kept, self._kept_from = [], len(self.packed)
+        return frames
 
     def recording(self) -> Recording:
         """The frames so far, with range and times."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sec_lab.recording import Recording
+from sec_lab.recording import Frame, Recording
 from sec_lab.worlds.katana.bench import STEP_S, Bench, Eye, build
 from sec_lab.worlds.katana.film import Film
 from sec_lab.worlds.katana.inverse import solved_joint_angles
@@ -51,6 +51,8 @@ class Run:
         At the start.
     film : bool, optional
         Without it nothing is rendered, and there is truth only.
+    watched : bool, optional
+        Whether somebody takes the frames while it runs, by :meth:`frames_since`.
     meshcat : Meshcat, optional
         Shows and records it.
 
@@ -68,6 +70,7 @@ class Run:
         labels: bool = False,
         gripper: Gripper = "ajar",
         film: bool = True,
+        watched: bool = False,
         meshcat: "Meshcat | None" = None,
     ) -> None:
         from pydrake.systems.analysis import Simulator
@@ -90,7 +93,7 @@ class Run:
         plant.SetPositions(self._plant_context, self._katana, q)
         self._simulator = Simulator(self._bench.diagram, self._context)
         self._eye = Eye(self._bench, scene.camera) if film else None
-        self._film = Film((scene.camera.height, scene.camera.width), FRAMES_PER_SECOND)
+        self._film = Film((scene.camera.height, scene.camera.width), FRAMES_PER_SECOND, keep=watched)
         self._labels = labels and film
         self._owner_of_geometry = _owners(self._bench)
         parts = [(geometry, name) for geometry, name in self._owner_of_geometry.items() if name != TABLE]
@@ -157,6 +160,21 @@ class Run:
             self._film.labels() if self._labels else None,
             {} if self._eye is None else self._eye.names,
         )
+
+    @property
+    def n_frames(self) -> int:
+        """Frames so far."""
+        return len(self._film)
+
+    def frames_since(self, first: int) -> tuple[Frame, ...]:
+        """Frames from a number on, without unpacking those before.
+
+        Parameters
+        ----------
+        first : int
+            Not below that of the last call: each picture is handed out once.
+        """
+        return self._film.latest(first)
 
     def view(self) -> View:
         """What the camera sees now."""
