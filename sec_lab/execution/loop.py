@@ -8,14 +8,14 @@ import numpy as np
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.execution.motion import Run, check_plan
-from sec_lab.execution.perception import TABLE, Perceived, Watcher
+from sec_lab.execution.perception import TABLE, Perceived, Watcher, things_in
 from sec_lab.execution.planning import Skill, Step, plan, shifted
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
 from sec_lab.worlds.katana.records import Fault, Move, Scene, Truth
 
 _NUDGE_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.005, 0.02, 4
-_LOOSE = 1.5
+_LOOSE = 2.5
 """How much wider than in the demonstrations the gap between things that touch may look."""
 _MOST_ATTEMPTS = 3
 _REST_S = 0.5
@@ -111,8 +111,7 @@ def execute_skill(
         At the first look, before anything moves: nothing can be done, or not by this arm.
     """
     run = Run(scene, fault=fault, watched=True)
-    first_look = Watcher(scene.camera, frames_per_second=20.0)
-    things = first_look.add(run.view())
+    things = things_in(run.view(), scene.camera)
     steps = plan(skill, things, home_m=scene.home_m)
     check_plan(scene, [move for step in steps for move in step.moves])
     verdicts: list[Verdict] = []
@@ -136,7 +135,7 @@ def execute_skill(
             gave_up = f"{attempt} attempts failed"
             break
         try:
-            things = Watcher(scene.camera, frames_per_second=20.0).add(run.view())
+            things = things_in(run.view(), scene.camera)
             steps = plan(skill, things, home_m=scene.home_m)
             for step in steps[:1]:
                 run.check(step.moves[0])

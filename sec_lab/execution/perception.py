@@ -35,11 +35,16 @@ CONTACT_M = (0.010, 0.014)
 away from the camera the touching side is hidden: what is seen then is up to a centimetre apart. Tuned on demonstrations
 of seed 7."""
 
+FINGER_M = 0.025
+"""Width of the fingers. An arm knows its own hand: where it stands before what it touches, its far side is hidden, and
+lies so far behind what is seen of it."""
+
 MINIMUM_PX = 20
 STEADY_S = 0.2
 """For how long a change must last to count; it is dated to the frame in which it began."""
 
 _FAR_M = 0.05
+_COARSE = 8
 _PART_SHARE = 0.3
 _JUMP_M = 0.02
 _RESTING_FRAMES = 5
@@ -136,13 +141,15 @@ class Watcher:
     def __len__(self) -> int:
         return len(self._centres)
 
-    def add(self, frame: Frame | View) -> tuple[SeenThing, ...]:
+    def add(self, frame: Frame | View, *, outlines: bool = False) -> tuple[SeenThing, ...]:
         """Perceive one more frame.
 
         Parameters
         ----------
         frame : Frame or View
             With range.
+        outlines : bool, optional
+            See :func:`things_in`.
 
         Returns
         -------
@@ -153,7 +160,7 @@ class Watcher:
         ValueError
             If the frame has no range.
         """
-        things = things_in(frame, self.camera, colours=self.colours, rays=self._rays)
+        things = things_in(frame, self.camera, colours=self.colours, rays=self._rays, outlines=outlines)
         seen = {thing.name: thing for thing in things}
         for name, thing in seen.items():
             heights = self._heights.setdefault(name, [])
@@ -209,7 +216,16 @@ class Watcher:
             if thing.name == ARM:
                 return float(thing.points_m[:, 2].min())
             return max(0.0, thing.top_m - float(np.median(self._heights[thing.name])))
-        return gap_m(one.points_m, other.points_m)
+        return gap_m(self._whole(one), self._whole(other))
+
+    def _whole(self, thing: SeenThing) -> Floats:
+        """Its surface; of the arm's own fingers the hidden side, too."""
+        if thing.name != ARM:
+            return thing.points_m
+        way = thing.points_m[:, :2] - self.camera.X_WC[:2, 3]
+        behind = thing.points_m.copy()
+        behind[:, :2] += FINGER_M * way / np.linalg.norm(way, axis=1, keepdims=True)
+        return np.concatenate([thing.points_m, behind])
 
 
 def perceive(recording: Recording, camera: Camera, *, colours: Sequence[NamedColour] = COLOURS) -> Perceived:
@@ -245,6 +261,7 @@ def things_in(
     *,
     colours: Sequence[NamedColour] = COLOURS,
     rays: Floats | None = None,
+    outlines: bool = True,
 ) -> tuple[SeenThing, ...]:
     """Things in one picture: segments by colour, put into space by their range.
 
@@ -255,6 +272,9 @@ def things_in(
     colours : sequence of NamedColour, optional
     rays : (height, width, 3) float64, optional
         Of the camera's pixels in the world, if they are known already.
+    outlines : bool, optional
+        Whether to find footprints and parts, which takes a while and only planning needs; without them a footprint is
+        empty, and the centre that of the smallest upright box.
 
     Returns
     -------
@@ -285,7 +305,7 @@ def things_in(
             continue
         where = np.nonzero(labels == label)
         points = rays[where] * frame.depth_m[where][:, None].astype(np.float64) + camera.X_WC[:3, 3]
-        found.append(_seen(colour.name, label, points, _n_parts(labels == label)))
+        found.append(_seen(colour.name, label, points, labels == label if outlines else None))
     return tuple(found)
 
 
@@ -303,14 +323,23 @@ def gap_m(one: Floats, other: Floats) -> float:
     """
     from scipy.spatial import cKDTree
 
-    near = []
-    for points, others in ((one, other), (other, one)):
-        low, high = others.min(axis=0) - _FAR_M, others.max(axis=0) + _FAR_M
-        near.append(points[((points >= low) & (points <= high)).all(axis=1)])
-    if not all(len(points) for points in near):
+    one, other = _near(one, other, _FAR_M), _near(other, one, _FAR_M)
+    if not (len(one) and len(other)):
         return float(np.inf)
-    distance, _ = cKDTree(near[0]).query(near[1], distance_upper_bound=2 * _FAR_M)
+    # A few of the points bound the distance; all that lie farther from the other set than this cannot be the nearest.
+    few, _ = cKDTree(one[::_COARSE]).query(other[::_COARSE])
+    bound = float(few.min()) + 1e-9
+    one, other = _near(one, other, bound), _near(other, one, bound)
+    distance, _ = cKDTree(one).query(other)
     return float(distance.min())
+
+
+def _near(points: Floats, others: Floats, reach_m: float) -> Floats:
+    """Those points that lie in the box round the others, made larger by a reach."""
+    if not len(points) or not len(others):
+        return points[:0]
+    low, high = others.min(axis=0) - reach_m, others.max(axis=0) + reach_m
+    return np.asarray(points[((points >= low) & (points <= high)).all(axis=1)])
 
 
 def decisive_rows(observation: Observation) -> EventChain | None:
@@ -339,9 +368,13 @@ def _has_contact_change(row: NDArray[np.uint8]) -> bool:
     return any({a, b} == {"N", "T"} for a, b in pairwise(letters))
 
 
-def _seen(name: str, label: int, points: Floats, n_parts: int) -> SeenThing:
-    footprint = _hull(points[:, :2])
-    middle = _centroid(footprint)
+def _seen(name: str, label: int, points: Floats, mask: NDArray[np.bool_] | None) -> SeenThing:
+    if mask is None:
+        footprint, n_parts = np.zeros((0, 2)), 1
+        middle = (points[:, :2].min(axis=0) + points[:, :2].max(axis=0)) / 2
+    else:
+        footprint, n_parts = _hull(points[:, :2]), _n_parts(mask)
+        middle = _centroid(footprint)
     # Single pixels on the rim may show what lies behind.
     bottom, top = (float(height) for height in np.percentile(points[:, 2], (1, 99)))
     centre = np.array([middle[0], middle[1], top / 2])

@@ -33,7 +33,7 @@ _TABLE_FRICTION, _THING_FRICTION = 0.35, 0.5
 _GAINS = {"pan": (900.0, 50.0), "lift_2": (1500.0, 90.0), "lift_3": (900.0, 50.0), "lift_4": (400.0, 20.0)}
 _ROLL_GAINS, _FINGER_GAINS = (60.0, 3.0), (12.0, 0.6)
 # What stops a ball that nobody pushes any more: the cloth of the table, which the contact model does not know.
-_ROLLING_N_M_S, _LEAST_ROLLING = 1.2e-3, 1e-6
+_ROLLING_N_M_S, _LEAST_ROLLING = 4e-3, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
