@@ -8,13 +8,14 @@ import numpy as np
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.execution.motion import Run, check_plan
-from sec_lab.execution.perception import TABLE, Perceived, Watcher, things_in
+from sec_lab.execution.perception import CONTACT_M, TABLE, Perceived, Watcher, things_in
 from sec_lab.execution.planning import Skill, Step, plan, shifted
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
 from sec_lab.worlds.katana.records import Fault, Move, Scene, Truth
 
 _NUDGE_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.005, 0.02, 4
+_MOVED_M = 0.006
 _LOOSE = 2.5
 """How much wider than in the demonstrations the gap between things that touch may look."""
 _MOST_ATTEMPTS = 3
@@ -194,7 +195,8 @@ def loose(perceived: Perceived, skill: Skill) -> str:
     skill : Skill
     """
     gap, most = perceived.last_gap_m(skill.first, skill.second), _LOOSE * skill.contact_gap_m
-    if gap <= most:
+    # What touches may hide where; then it is the other's having been moved that tells.
+    if gap <= most or (gap <= CONTACT_M[0] and perceived.moved_m[skill.second] >= _MOVED_M):
         return ""
     return f"{_told(frozenset((skill.first, skill.second)))}: expected a gap of at most {most:.4f} m, got {gap:.4f} m"
 
@@ -216,7 +218,8 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
             break
         # The model asks for touching; how close that looks, the demonstrations have shown.
         gap = perceived.last_gap_m(*step.rule.pair)
-        if not why and (skill.prime in pair or gap <= skill.contact_gap_m):
+        firm = gap <= skill.contact_gap_m or perceived.moved_m.get(skill.second, 0.0) >= _MOVED_M
+        if not why and (skill.prime in pair or firm):
             break
         further_m += max(_NUDGE_M, min(gap, _MOST_FURTHER_M)) if skill.prime not in pair else _NUDGE_M
         way = np.array([np.cos(step.heading_rad), np.sin(step.heading_rad), 0.0])
