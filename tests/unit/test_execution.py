@@ -195,3 +195,20 @@ def test_the_arm_repeats_what_it_has_learned_and_judges_itself(skill: Skill) -> 
     assert not failed.success
     wrong = next(verdict for verdict in failed.verdicts if not verdict.agrees)
     assert wrong.rule == "{green box, red box} N→T"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "rule"),
+    [
+        (Fault("slips", "bring", "red box", share=0.2), "{green box, red box} N→T"),
+        (Fault("missed", "over", offset_m=(0.0, 0.09)), "{red box, robot arm} N→T"),
+        (Fault("wrong object", "over", "green box", "red box"), "{red box, robot arm} N→T"),
+    ],
+)
+def test_planted_failures_are_recognised_at_their_move(skill: Skill, fault: Fault, rule: str) -> None:
+    """Each is seen by the camera alone, after the move in which it happens (§2.10.5)."""
+    failed = execute_skill(example_scene("c"), skill, fault=fault, most_attempts=1)
+    assert not failed.success
+    assert not failed.truth.touching("red box", "green box")[-1]
+    assert next(verdict.rule for verdict in failed.verdicts if not verdict.agrees) == rule
