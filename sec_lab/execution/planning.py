@@ -1,0 +1,339 @@
+"""Planning (§2.10.4): every transition of the model becomes a rule, and the rules motion in the scene as seen."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sec_lab.action_model import ActionModel
+from sec_lab.codes import LETTER_OF, Relation
+from sec_lab.execution.anchors import (
+    Points,
+    border_distance,
+    connection_vector,
+    end_points,
+    in_frame,
+    intersections,
+    segment_length,
+    start_points,
+    touching_points,
+)
+from sec_lab.execution.perception import Perceived, SeenThing, things_in
+from sec_lab.learning import learn
+from sec_lab.recording import Recording
+from sec_lab.worlds.katana.records import Camera, Floats, Move, Point
+
+_CLEARANCE_M = 0.045
+"""Between the tip and what it goes past: half a hand, and what perception may be off."""
+_OVER_M = 0.12
+"""Least height at which the tip passes over things."""
+_FREE_M_S = 0.3
+
+
+class SceneError(ValueError):
+    """Nothing can be done in the scene as it is seen; the message says why."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A transition of the model (§2.10.5).
+
+    Parameters
+    ----------
+    column : int
+        In which it is reached.
+    pair : tuple of str
+        Whose relation changes.
+    change : str
+        Such as "NT".
+    """
+
+    column: int
+    pair: tuple[str, str]
+    change: str
+
+
+@dataclass(frozen=True, eq=False)
+class Skill:
+    """What was learned of a dual-object manipulation: the model, and the anchor points of its demonstrations.
+
+    Parameters
+    ----------
+    model : ActionModel
+    rules : tuple of Rule
+    prime, first, second : str
+        Prime mover, first and second touched object.
+    starts, touches, ends : Points
+        D2, D3 (relative, along the connection vector) and D8.
+    standoff_m : float
+        From the border of the first object to the tip as it touches: the lower quartile of the demonstrations, as
+        touching is perceived a little early where it is seen well.
+    press_m : float
+        By which the tip went beyond E₁ + Δ at the end of the second segment, mostly negative: the tip has a size (D7).
+    side_rad : float
+        Direction from the origin in which the tip touches, from the connection vector.
+    speed_m_s : float
+        Mean speed of the tip on the second segment.
+    contact_gap_m : float
+        Widest gap that was seen between first and second object while they stood touching in the end.
+    """
+
+    model: ActionModel
+    rules: tuple[Rule, ...]
+    prime: str
+    first: str
+    second: str
+    starts: Points
+    touches: Points
+    ends: Points
+    standoff_m: float
+    press_m: float
+    side_rad: float
+    speed_m_s: float
+    contact_gap_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstrated:
+    """One demonstration as it is learned from.
+
+    Parameters
+    ----------
+    recording : Recording
+    camera : Camera
+    perceived : Perceived
+    tip_m : (n, 3) float64
+        Of the arm, from its own joints.
+    """
+
+    recording: Recording
+    camera: Camera
+    perceived: Perceived
+    tip_m: Floats
+
+
+@dataclass(frozen=True)
+class Step:
+    """Moves of the arm that follow one rule.
+
+    Parameters
+    ----------
+    rule : Rule
+    moves : tuple of Move
+    heading_rad : float
+        Of the connection vector.
+    column_is_last : bool
+        Whether the model ends there.
+    """
+
+    rule: Rule
+    moves: tuple[Move, ...]
+    heading_rad: float
+    column_is_last: bool
+
+
+def rules_of(model: ActionModel) -> tuple[Rule, ...]:
+    """Rules of a model: its transitions between N, T and A, column after column.
+
+    Parameters
+    ----------
+    model : ActionModel
+    """
+    chain = model.chain
+    rules = []
+    for column in range(1, chain.relations.shape[1]):
+        for row, (one, other) in enumerate(chain.pairs):
+            before, after = (LETTER_OF[Relation(int(chain.relations[row, at]))] for at in (column - 1, column))
+            if before != after:
+                pair = (str(chain.names[int(one)]), str(chain.names[int(other)]))
+                rules.append(Rule(column, pair, before + after))
+    return tuple(rules)
+
+
+def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
+    """Learn the model (step 7) and read the anchor points off the key frames of all demonstrations (§2.10.3).
+
+    Parameters
+    ----------
+    demonstrations : mapping of str to Demonstrated
+
+    Returns
+    -------
+    Skill
+
+    Raises
+    ------
+    ValueError
+        If the model has no two transitions from N to T that follow each other in one object.
+    """
+    chains = {name: one.perceived.chain for name, one in demonstrations.items() if one.perceived.chain is not None}
+    model = learn(chains)
+    rules = rules_of(model)
+    contacts = [rule for rule in rules if rule.change == "NT"]
+    if len(contacts) < 2:
+        raise ValueError(f"model: expected two transitions from N to T, got {len(contacts)}")
+    shared = set(contacts[0].pair) & set(contacts[1].pair)
+    if len(shared) != 1:
+        raise ValueError(f"model: expected one object in both transitions from N to T, got {sorted(shared)}")
+    (first,) = shared
+    (prime,) = set(contacts[0].pair) - shared
+    (second,) = set(contacts[1].pair) - shared
+    leaving = next(rule.column for rule in rules if rule.change == "TN" and prime in rule.pair)
+    rows = []
+    for name in chains:
+        one = demonstrations[name]
+        frames = dict(enumerate(model.key_frames[model.demonstrations.index(name)].tolist()))
+        seen_at = [frames[contacts[0].column - 1], frames[contacts[0].column], frames[contacts[1].column]]
+        if min(seen_at) < 0 or frames[leaving] < 0:
+            continue
+        rows.append(_measured(one, seen_at, frames[leaving], first, second))
+    if not rows:
+        raise ValueError("demonstrations: expected one with all key frames of the model, got none")
+    starts, tips, origins, vectors, standoffs, presses, ends, speeds = (
+        list(column) for column in zip(*rows, strict=True)
+    )
+    touches = touching_points(np.array(tips), np.array(origins), np.array(vectors))
+    middle = np.median(touches.points_m, axis=0)
+    return Skill(
+        model,
+        rules,
+        prime,
+        first,
+        second,
+        start_points(np.array(starts)),
+        touches,
+        end_points(np.array(ends)),
+        float(np.percentile(standoffs, 25)),
+        float(np.median(presses)),
+        float(np.arctan2(middle[1], middle[0])),
+        float(np.median(speeds)),
+        max(one.perceived.last_gap_m(first, second) for one in demonstrations.values()),
+    )
+
+
+def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[Step, ...]:
+    """Motion for a scene: the rules of the model, one after the other, by vector addition (§2.10.5).
+
+    Parameters
+    ----------
+    skill : Skill
+    things : sequence of SeenThing
+        As the camera sees them.
+    home_m : tuple of float
+        Where the tip goes in the end.
+
+    Returns
+    -------
+    tuple of Step
+
+    Raises
+    ------
+    SceneError
+        If an object is missing, or they touch already.
+    """
+    first, second = check_scene(skill, things)
+    found = intersections(first, second)
+    vector = connection_vector(first, second)
+    way = vector[:2] / np.linalg.norm(vector[:2])
+    facing = float(np.arctan2(way[1], way[0]))
+    # The tip stands off the border where the demonstrations touched: seen from the origin, on this side of it.
+    side = facing + skill.side_rad
+    outwards = np.array([np.cos(side), np.sin(side)])
+    border = border_distance(first.footprint_m, first.centre_m[:2], outwards)
+    touch = first.centre_m[:2] + (border + skill.standoff_m) * outwards
+    height = float(np.median(skill.touches.points_m[:, 2] + first.top_m / 2))
+    over = max(_OVER_M, *(thing.top_m + 0.05 for thing in (first, second)))
+    at, steps = touch, []
+    for rule in skill.rules:
+        moves: tuple[Move, ...]
+        if rule.change == "NT" and set(rule.pair) == {skill.prime, skill.first}:
+            outside = touch + _CLEARANCE_M * outwards
+            moves = (
+                Move(_at(outside, over), name="over", facing_rad=facing, speed_m_s=_FREE_M_S),
+                Move(_at(outside, height), name="down", speed_m_s=0.1),
+                Move(_at(touch, height), name="reach", speed_m_s=skill.speed_m_s),
+            )
+        elif rule.change == "NT" and set(rule.pair) == {skill.first, skill.second}:
+            at = found.E1_m + (segment_length(found) + skill.press_m) * way
+            moves = (Move(_at(at, height), name="bring", speed_m_s=skill.speed_m_s),)
+        elif rule.change == "TN" and skill.prime in rule.pair:
+            away = at + (_CLEARANCE_M + 0.01) * outwards
+            moves = (Move(_at(away, height), name="leave", speed_m_s=skill.speed_m_s),)
+            at = away
+        elif rule.change == "NA" and skill.prime in rule.pair:
+            moves = (
+                Move(_at(at, over), name="up", speed_m_s=0.1),
+                Move(home_m, name="home", speed_m_s=_FREE_M_S),
+            )
+        else:
+            # The prime mover comes into view on its way to the first object.
+            continue
+        steps.append(Step(rule, moves, facing, rule.column == skill.rules[-1].column))
+    return tuple(steps)
+
+
+def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, SeenThing]:
+    """First and second object of a scene, or one clear error.
+
+    Parameters
+    ----------
+    skill : Skill
+    things : sequence of SeenThing
+
+    Raises
+    ------
+    SceneError
+        If one is missing, there are two candidates, one is not on the table, or they touch already.
+    """
+    from sec_lab.execution.perception import CONTACT_M, gap_m
+
+    seen = {thing.name: thing for thing in things}
+    for name in (skill.first, skill.second):
+        if name not in seen:
+            raise SceneError(f"scene: expected something that looks like {name!r}, got {sorted(seen)}")
+        if seen[name].n_parts > 1:
+            raise SceneError(f"scene: expected one candidate for {name!r}, got {seen[name].n_parts}")
+        if not 0.01 < seen[name].top_m < 0.2 or seen[name].bottom_m < -0.01:
+            raise SceneError(f"scene: expected {name!r} on the table, got its top at {seen[name].top_m:.3f} m")
+    first, second = seen[skill.first], seen[skill.second]
+    if gap_m(first.points_m, second.points_m) < CONTACT_M[0]:
+        raise SceneError(f"scene: expected {skill.first!r} and {skill.second!r} apart, got them touching already")
+    return first, second
+
+
+def _measured(
+    one: Demonstrated, frames: Sequence[int], leaving: int, first: str, second: str
+) -> tuple[Floats, Floats, Floats, Floats, float, float, Floats, float]:
+    """What one demonstration says: where the tip was, and how far from the borders."""
+    appears, touches, _ = frames
+    before = {}
+    for frame in one.recording:
+        # The objects are measured where nothing hides them yet: just before the arm is first seen.
+        if frame.index == max(appears - 1, 0):
+            before = {thing.name: thing for thing in things_in(frame, one.camera)}
+            break
+    red, green = before[first], before[second]
+    vector = connection_vector(red, green)
+    tip = one.tip_m[touches]
+    outwards = tip[:2] - red.centre_m[:2]
+    outwards = outwards / np.linalg.norm(outwards)
+    border = border_distance(red.footprint_m, red.centre_m[:2], outwards)
+    standoff = float(np.linalg.norm(tip[:2] - red.centre_m[:2]) - border)
+    farthest = max(in_frame(point, red.centre_m, vector)[0] for point in one.tip_m[touches:leaving])
+    found = intersections(red, green)
+    press = farthest - in_frame([*found.E1_m, 0.0], red.centre_m, vector)[0] - segment_length(found)
+    moving = one.tip_m[touches:leaving]
+    steps = np.linalg.norm(np.diff(moving, axis=0), axis=1)
+    fps = one.recording.frames_per_second or 20.0
+    speed = float(steps[steps > 1e-4].mean() * fps)
+    return one.tip_m[appears], tip, red.centre_m, vector, standoff, float(press), one.tip_m[-1], speed
+
+
+def shifted(move: Move, by_m: Floats) -> Move:
+    """The same move elsewhere."""
+    x, y, z = (float(value) for value in np.asarray(move.to_m) + by_m)
+    return replace(move, to_m=(x, y, z))
+
+
+def _at(point: Floats, height_m: float) -> Point:
+    return float(point[0]), float(point[1]), height_m
