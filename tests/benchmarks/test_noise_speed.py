@@ -75,9 +75,16 @@ def test_training_the_network(benchmark: BenchmarkFixture) -> None:
     benchmark.pedantic(lambda: ThesisNetwork(random_state=0).fit(chains, names), rounds=3, warmup_rounds=1)
     wanted = np.eye(4)[np.unique(names, return_inverse=True)[1]]
     other = MLPRegressor(
-        (5, 5), activation="logistic", solver="sgd", momentum=0, learning_rate_init=0.05, batch_size=1, max_iter=10,
-        tol=0, n_iter_no_change=1000,
-    )  # fmt: skip
+        hidden_layer_sizes=(5, 5),
+        activation="logistic",
+        solver="sgd",
+        momentum=0,
+        learning_rate_init=0.05,
+        batch_size=1,
+        max_iter=10,
+        tol=0,
+        n_iter_no_change=1000,
+    )
     with pytest.warns(match="Maximum iterations"):
         theirs = 100 * seconds(lambda: other.fit(chain_vectors(chains), wanted))
     ours = seconds(lambda: ThesisNetwork(random_state=0).fit(chains, names))
