@@ -14,8 +14,9 @@ from sklearn.neural_network import MLPRegressor
 
 import sec_lab as sl
 from sec_lab.baselines import ThesisNetwork, chain_vectors
-from sec_lab.noise import LEVELS, Noise, model_study, noise_study, noisy_samples
+from sec_lab.noise import LEVELS, Noise, noisy_samples
 from sec_lab.noise_seeds import CLASS_SEEDS, LIFTING, SEEDS
+from sec_lab.noise_studies import model_study, noise_study
 from sec_lab.opponents import labelled_samples
 from sec_lab.roles import corresponding_segments
 

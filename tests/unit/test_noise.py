@@ -17,12 +17,11 @@ from sec_lab.noise import (
     NoisySamples,
     added_only,
     compare_with_seed,
-    model_study,
-    noise_study,
     noisy_samples,
     shuffled_rows,
 )
 from sec_lab.noise_seeds import CLASS_SEEDS, LIFTING, SEEDS
+from sec_lab.noise_studies import model_study, noise_study
 from sec_lab.roles import AmbiguousRoleError, corresponding_segments
 
 MODES = st.sampled_from(["flip and add", "add only", "flip only"])
