@@ -6,7 +6,7 @@ numbers do not depend on threads, processes or machines.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args, overload
 
 import numpy as np
@@ -310,17 +310,6 @@ def shuffled_rows(samples: NoisySamples, *, rng: np.random.Generator) -> list[Ev
         order = rng.permutation(len(chain.pairs))
         chains.append(EventChain(chain.relations[order], chain.pairs[order], chain.key_frames, chain.names))
     return chains
-
-
-def added_only(noise: Noise) -> Noise:
-    """The same noise without flips.
-
-    Examples
-    --------
-    >>> added_only(Noise(relations=(0, 2))).mode
-    'add only'
-    """
-    return replace(noise, mode="add only")
 
 
 def as_level(p: float) -> float:

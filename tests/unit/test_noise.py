@@ -15,7 +15,6 @@ from sec_lab.noise import (
     LEVELS,
     Noise,
     NoisySamples,
-    added_only,
     compare_with_seed,
     noisy_samples,
     shuffled_rows,
@@ -241,7 +240,6 @@ def test_samples_are_a_sequence_and_read_only() -> None:
     assert np.array_equal(samples[1:3][0].relations, samples[1].relations)
     with pytest.raises(ValueError, match="read-only"):
         samples.relations[0, 0, 0] = 1
-    assert added_only(Noise(added_values="lasting")) == Noise(mode="add only", added_values="lasting")
     assert LEVELS[0] == 0.0
     assert LEVELS[-1] == 1.0
 
