@@ -26,7 +26,7 @@ from sec_lab.viz.svg.paper import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MOST_PERMUTATIONS = 500
+MOST_PERMUTATIONS = 100
 """Permutations of a match that are listed; there may be thousands."""
 
 _WIDTH_PX, _JOIN_PX, _ABOVE_PX, _BELOW_PX = 960.0, 64.0, 46.0, 62.0

@@ -8,10 +8,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sec_lab.viz.widgets.learning import learning_explorer as learning_explorer
+    from sec_lab.viz.widgets.match import match_explorer as match_explorer
+    from sec_lab.viz.widgets.noise import noise_explorer as noise_explorer
     from sec_lab.viz.widgets.picture import ClickablePicture as ClickablePicture
+    from sec_lab.viz.widgets.segmentation import segmentation_explorer as segmentation_explorer
+    from sec_lab.viz.widgets.table import table_explorer as table_explorer
 
 _MODULE_OF = {
     "ClickablePicture": "picture",
+    "learning_explorer": "learning",
+    "match_explorer": "match",
+    "noise_explorer": "noise",
+    "segmentation_explorer": "segmentation",
+    "table_explorer": "table",
 }
 __all__ = list(_MODULE_OF)
 
