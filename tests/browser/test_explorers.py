@@ -104,7 +104,9 @@ def test_match_explorer(lab: Lab, screenshot: Callable[..., Path]) -> None:
 
 
 def test_table_explorer(lab: Lab, screenshot: Callable[..., Path]) -> None:
-    page = lab.open(CHAINS, "widgets.table_explorer(chains, classes, normalizer='shorter')", dark=True, height=1500)
+    page = lab.open(CHAINS, "widgets.table_explorer(chains, classes, normalizer='shorter')", height=1500)
+    page.evaluate("() => void jupyterapp.commands.execute('apputils:change-theme', {theme: 'JupyterLab Dark'})")
+    page.wait_for_selector("body[data-jp-theme-light=false]", state="attached")
     table = host(page, "similarities of all pairs")
     says(page, re.compile(r"threshold 64 %: \d+ of 15 pairs are similar; \d+ false negative"))
     slider(page, "threshold").locator(".noUi-handle").focus()
