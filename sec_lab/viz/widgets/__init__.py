@@ -8,10 +8,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sec_lab.viz.widgets.explorer import ChainExplorer as ChainExplorer
+    from sec_lab.viz.widgets.explorer import chain_explorer as chain_explorer
     from sec_lab.viz.widgets.picture import ClickablePicture as ClickablePicture
 
 _MODULE_OF = {
+    "ChainExplorer": "explorer",
     "ClickablePicture": "picture",
+    "chain_explorer": "explorer",
 }
 __all__ = list(_MODULE_OF)
 
