@@ -27,7 +27,7 @@ from sec_lab.viz.widgets import (
     segmentation_explorer,
     table_explorer,
 )
-from sec_lab.viz.widgets.explorer import Explorer
+from sec_lab.viz.widgets.base import Explorer
 
 TYPES = ["putting", "pouring"]
 

@@ -8,6 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sec_lab.viz.widgets.explorer import ChainExplorer as ChainExplorer
+    from sec_lab.viz.widgets.explorer import chain_explorer as chain_explorer
     from sec_lab.viz.widgets.learning import learning_explorer as learning_explorer
     from sec_lab.viz.widgets.match import match_explorer as match_explorer
     from sec_lab.viz.widgets.noise import noise_explorer as noise_explorer
@@ -16,7 +18,9 @@ if TYPE_CHECKING:
     from sec_lab.viz.widgets.table import table_explorer as table_explorer
 
 _MODULE_OF = {
+    "ChainExplorer": "explorer",
     "ClickablePicture": "picture",
+    "chain_explorer": "explorer",
     "learning_explorer": "learning",
     "match_explorer": "match",
     "noise_explorer": "noise",

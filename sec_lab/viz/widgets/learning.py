@@ -11,8 +11,8 @@ from sec_lab.similarity import EFFORT, Normalizer, check_options
 from sec_lab.viz.exploring import Learned, Seen, chain_of, learn_and_compare
 from sec_lab.viz.svg.model import model_svg
 from sec_lab.viz.svg.paper import sentence
+from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
-from sec_lab.viz.widgets.explorer import LABELS, Explorer, never_raises, row_of
 
 Demonstrations: TypeAlias = Sequence[Seen] | Mapping[str, Seen]
 

@@ -17,8 +17,8 @@ from sec_lab.viz.svg.match import (
     with_permutation,
 )
 from sec_lab.viz.svg.paper import data_address, sentence
+from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
-from sec_lab.viz.widgets.explorer import LABELS, Explorer, never_raises, row_of
 
 Pictures: TypeAlias = Mapping[int, ArrayLike]
 

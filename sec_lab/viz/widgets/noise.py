@@ -14,8 +14,8 @@ from sec_lab.viz.exploring import NoiseCurves, chain_of, noise_curves, noise_exa
 from sec_lab.viz.svg.curves import curves_svg
 from sec_lab.viz.svg.model import sample_svg
 from sec_lab.viz.svg.paper import sentence
+from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
-from sec_lab.viz.widgets.explorer import LABELS, Explorer, never_raises, row_of
 
 N_SAMPLES = (10, 30, 100, 300, 1000)
 """Numbers of samples that can be chosen."""

@@ -68,13 +68,23 @@ function render({ model, el }) {
     model.set("key", [event.key, next("key")]);
     model.save_changes();
   });
+  function see() {
+    const isDark = document.body.dataset.jpThemeLight === "false";
+    if (model.get("is_dark") === isDark) return;
+    model.set("is_dark", isDark);
+    model.save_changes();
+  }
+  const themes = new MutationObserver(see);
+  themes.observe(document.body, { attributes: true, attributeFilter: ["data-jp-theme-light"] });
   const heard = { "change:png": draw, "change:width": fit, "change:description": tell, "change:tooltip": tell };
   for (const [name, hear] of Object.entries(heard)) model.on(name, hear);
   fit();
   tell();
   draw();
+  see();
   return () => {
     isGone = true;
+    themes.disconnect();
     for (const [name, hear] of Object.entries(heard)) model.off(name, hear);
   };
 }
@@ -110,6 +120,8 @@ class ClickablePicture(anywidget.AnyWidget):
     clicked : list of int
         ``[x, y, n]``: column and row of the last click in pixels of the picture, whatever its size on the page, and
         how many clicks there were. Empty before the first.
+    is_dark : bool
+        Whether the page has a dark theme, as far as a page has said so.
     key : list
         ``[name, n]``: the last key by its name in browsers (``"ArrowLeft"``, ``" "``, ``"a"``), and how many there
         were.
@@ -131,6 +143,7 @@ class ClickablePicture(anywidget.AnyWidget):
     width = traitlets.Int(0, min=0).tag(sync=True)
     description = traitlets.Unicode("").tag(sync=True)
     tooltip = traitlets.Unicode("").tag(sync=True)
+    is_dark = traitlets.Bool(default_value=False).tag(sync=True)
     clicked: traitlets.List[int] = traitlets.List().tag(sync=True)
     key: traitlets.List[str | int] = traitlets.List().tag(sync=True)
 

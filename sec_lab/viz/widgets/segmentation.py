@@ -15,7 +15,7 @@ from sec_lab.segmentation.potts import DEFAULT, ColourSpace, PottsParameters
 from sec_lab.viz.exploring import SegmentedFrame, beside_each_other, segmented_frame
 from sec_lab.viz.frame_shelf import FrameShelf
 from sec_lab.viz.svg.paper import png, sentence
-from sec_lab.viz.widgets.explorer import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.latest import Turn
 from sec_lab.viz.widgets.picture import ClickablePicture
 

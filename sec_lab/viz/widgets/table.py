@@ -12,8 +12,8 @@ from sec_lab.viz.exploring import Seen, chain_of
 from sec_lab.viz.svg.curves import curves_svg
 from sec_lab.viz.svg.paper import sentence
 from sec_lab.viz.svg.table import cell_at, moved, table_layout, table_svg, table_words
+from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
-from sec_lab.viz.widgets.explorer import LABELS, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.match import MatchExplorer, Pictures
 
 if TYPE_CHECKING:
