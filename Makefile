@@ -11,7 +11,7 @@ NBVAL := --nbval --nbval-current-env --nbval-cell-timeout=300
 LAB := --LabApp.default_url=/lab/tree/notebooks --LabApp.news_url=None --LabApp.extension_manager=readonly \
        --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate
 # Tests of every kind; folders that are not there are left out.
-TESTS := $(wildcard README.md tests/unit tests/integration tests/notebooks tests/benchmarks sec_lab notebooks)
+TESTS := $(wildcard README.md tests/unit tests/integration tests/notebooks tests/browser tests/benchmarks sec_lab notebooks)
 
 # Kernels come from .venv, whatever else is installed for the user; figures from the notebooks' own backend.
 export JUPYTER_PREFER_ENV_PATH := 1

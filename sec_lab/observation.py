@@ -11,6 +11,7 @@ from sec_lab.codes import as_integers
 from sec_lab.event_chain import EventChain, Names, as_names, event_chain
 from sec_lab.scene_graph import MainGraphs, SceneGraph, as_key_frames
 from sec_lab.segmentation import Segmentation
+from sec_lab.segmentation.merging import Groups, as_groups, merged_names, merged_segments
 
 PositionUnit = Literal["px", "m", "unknown"]
 
@@ -136,17 +137,57 @@ def without_segments(observation: Observation, segments: Iterable[int]) -> Obser
     unknown = np.setdiff1d(dropped, observation.segments)
     if unknown.size:
         raise ValueError(f"segments: expected labels that were seen, got {unknown[0]}")
-    graphs: list[SceneGraph | None] = []
-    frames: list[int] = []
-    last: SceneGraph | None = None
-    for graph, frame in zip(observation.graphs, observation.key_frames.tolist(), strict=True):
-        smaller = None if graph is None else _without(graph, dropped)
-        if smaller is None or last is None or not last.same_relations(smaller):
-            graphs.append(smaller)
-            frames.append(frame)
-        last = smaller or last
+    smaller = [None if graph is None else _without(graph, dropped) for graph in observation.graphs]
+    graphs, frames = _changed(smaller, observation.key_frames)
     names = {label: name for label, name in observation.names.items() if label not in dropped}
     return Observation(graphs, frames, names, observation.position_unit, observation.segmentation)
+
+
+def merge_segments(observation: Observation, groups: Groups) -> Observation:
+    """The same observation with the fragments of objects taken together, by its scene graphs alone (§2.11).
+
+    Of the relations that the fragments of a group had to another segment the closest stays: touching before
+    overlapping before non-touching. Key frames at which nothing else changed are no key frames any more. Where label
+    images are at hand, relations that are found anew in :func:`~sec_lab.segmentation.merging.merged_segments` are
+    better: fragments that surround a segment between them overlap with it, though none of them did.
+
+    Parameters
+    ----------
+    observation : Observation
+    groups : iterable of iterable of int
+        Labels that belong together; the first of a group stays.
+
+    Returns
+    -------
+    Observation
+        A node stands in the middle of its fragments. The segmentation, if there is one, is merged too.
+
+    Raises
+    ------
+    ValueError
+        If a label was not seen, a group has fewer than two, or a label is in two groups.
+
+    Examples
+    --------
+    >>> graph = SceneGraph([1, 2, 3], [[0, 0, 2], [0, 0, 2], [2, 2, 0]])
+    >>> merge_segments(Observation([graph], [0]), [[2, 3]]).graphs[0].edges()
+    [(1, 2, <Relation.TOUCHING: 2>)]
+    """
+    checked = as_groups(groups)
+    unknown = np.setdiff1d([label for group in checked for label in group], observation.segments)
+    if unknown.size:
+        raise ValueError(f"groups: expected labels that were seen, got {int(unknown[0])}")
+    new_label = {label: group[0] for group in checked for label in group}
+    merged = [None if graph is None else _with_labels(graph, new_label) for graph in observation.graphs]
+    graphs, frames = _changed(merged, observation.key_frames)
+    segmentation = observation.segmentation
+    return Observation(
+        graphs,
+        frames,
+        merged_names(observation.names, checked),
+        observation.position_unit,
+        None if segmentation is None else merged_segments(segmentation, checked),
+    )
 
 
 def without_fragments(observation: Observation) -> Observation:
@@ -171,3 +212,34 @@ def _without(graph: SceneGraph, dropped: NDArray[np.int64]) -> SceneGraph:
         None if graph.positions is None else graph.positions[keep],
         None if graph.types is None else [graph.types[i] for i in keep],
     )
+
+
+def _with_labels(graph: SceneGraph, new_label: dict[int, int]) -> SceneGraph:
+    """The graph with some nodes taken together; of several relations the closest, which has the largest code."""
+    renamed = np.array([new_label.get(label, label) for label in graph.segments.tolist()], dtype=np.int64)
+    segments, first, place = np.unique(renamed, return_index=True, return_inverse=True)
+    codes = np.zeros((len(segments), len(segments)), dtype=np.uint8)
+    np.maximum.at(codes, (place[:, None], place[None, :]), graph.relations)
+    np.fill_diagonal(codes, 0)
+    positions = None
+    if graph.positions is not None:
+        sums = np.zeros((len(segments), graph.positions.shape[1]))
+        np.add.at(sums, place, graph.positions)
+        positions = sums / np.bincount(place, minlength=len(segments))[:, None]
+    types = None if graph.types is None else [graph.types[i] for i in first]
+    return SceneGraph(segments, codes, positions, types)
+
+
+def _changed(
+    graphs: Sequence[SceneGraph | None], key_frames: NDArray[np.int64]
+) -> tuple[list[SceneGraph | None], list[int]]:
+    """The graphs that differ from the one before, and those that were not recorded, with their frames (step 3)."""
+    kept: list[SceneGraph | None] = []
+    frames: list[int] = []
+    last: SceneGraph | None = None
+    for graph, frame in zip(graphs, key_frames.tolist(), strict=True):
+        if graph is None or last is None or not last.same_relations(graph):
+            kept.append(graph)
+            frames.append(frame)
+        last = graph or last
+    return kept, frames

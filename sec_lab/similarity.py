@@ -358,15 +358,18 @@ class Permutation:
     ----------
     rows : (n_corresponding, 2) int64
         Corresponding rows, as in :class:`Match`.
+    columns : (n_aligned, 2) int64
+        Aligned columns, as in :class:`Match`.
     temporal : float
         ψ_temporal of this permutation in percent.
     """
 
     rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
     temporal: float
 
     def __post_init__(self) -> None:
-        _protect(self, "rows")
+        _protect(self, "rows", "columns")
 
 
 def permutations(match: Match, *, limit: int = 10_000) -> list[Permutation]:
@@ -395,15 +398,17 @@ def permutations(match: Match, *, limit: int = 10_000) -> list[Permutation]:
     derived = match.temporal_input == "derived"
     packed = PackedChains([match.a, match.b], ["first chain", "second chain"], derived=derived)
     u, v = packed.n_columns.tolist()
+    rows_a, rows_b = match.a.changing_rows, match.b.changing_rows
     found: list[Permutation] = []
     for partners in _assignments(match.candidates):
         if len(found) == limit:
             raise ValueError(f"permutations: expected at most {limit}, there are more")
         equal = packed.equal_entries(partners)
-        total = kernels.ordered_columns_value(equal.ravel(), 0, u, v, v, np.empty(v + 1, np.int64))
-        rows = [(match.a.changing_rows[i], match.b.changing_rows[j]) for i, j in partners]
-        temporal = 100.0 * total / min(u, v) / len(match.candidates)
-        found.append(Permutation(np.array(rows, np.int64).reshape(-1, 2), temporal))
+        aligned = kernels.ordered_columns(equal.ravel(), 0, u, v, v)
+        rows = [(rows_a[i], rows_b[j]) for i, j in partners]
+        columns = np.column_stack([np.flatnonzero(aligned >= 0), aligned[aligned >= 0]])
+        temporal = 100.0 * equal[*columns.T].sum() / min(u, v) / len(match.candidates)
+        found.append(Permutation(np.array(rows, np.int64).reshape(-1, 2), columns, temporal))
     return found
 
 

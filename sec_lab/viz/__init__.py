@@ -16,6 +16,8 @@ from sec_lab.viz.dots import draw_spread as draw_spread
 from sec_lab.viz.gallery import Panel as Panel
 from sec_lab.viz.gallery import draw_gallery as draw_gallery
 from sec_lab.viz.gallery import graph_at as graph_at
+from sec_lab.viz.graph_3d import Page3D as Page3D
+from sec_lab.viz.graph_3d import draw_graph_3d as draw_graph_3d
 from sec_lab.viz.match import draw_match as draw_match
 from sec_lab.viz.moments import draw_moments as draw_moments
 from sec_lab.viz.noise import draw_levels as draw_levels

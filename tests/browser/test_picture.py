@@ -1,0 +1,45 @@
+"""The picture that takes clicks and keys, in JupyterLab and in Notebook 7."""
+
+import pytest
+
+from tests.browser.conftest import Lab
+
+PICTURE = """
+import cv2, ipywidgets, numpy as np
+from sec_lab.viz.widgets import ClickablePicture
+
+def png(blue):
+    image = np.full((20, 30, 3), (blue, 0, 0), dtype=np.uint8)
+    return cv2.imencode(".png", image)[1].tobytes()
+
+picture = ClickablePicture(png=png(50), width=600, description="a blue field")
+told = ipywidgets.Label("nothing")
+
+def clicked(x, y):
+    told.value = f"click {x} {y}"
+    picture.png = png(250)
+
+picture.on_click(clicked)
+picture.on_key(lambda name: setattr(told, "value", f"key {name}."))
+ipywidgets.VBox([picture, told])
+"""
+
+
+@pytest.mark.parametrize("front", ["lab", "notebook"])
+def test_clicks_and_keys_reach_the_kernel_and_the_picture_changes(lab: Lab, front: str) -> None:
+    page = lab.open(PICTURE, front=front)
+    picture = page.get_by_role("img", name="a blue field")
+    told = page.locator(".widget-label")
+    blue = "canvas => canvas.getContext('2d').getImageData(3, 3, 1, 1).data[2]"
+    page.wait_for_selector("canvas[data-drawn='1']")
+    assert picture.evaluate(blue) == 50
+    # 20 pixels of the page are one of the picture.
+    picture.click(position={"x": 610 - 20, "y": 30})
+    page.wait_for_selector("canvas[data-drawn='2']")
+    assert picture.evaluate(blue) == 250
+    assert told.inner_text() == "click 29 1"
+    for key, name in (("ArrowLeft", "ArrowLeft"), ("a", "a"), ("d", "d"), ("Space", " ")):
+        page.keyboard.press(key)
+        page.get_by_text(f"key {name}.", exact=True).wait_for()
+    # None of the keys was a command of the notebook.
+    assert page.locator(".jp-CodeCell").count() == 1
