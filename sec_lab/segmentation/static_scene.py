@@ -19,6 +19,7 @@ BACKGROUND = 1
 _RISES = 3.0
 _STRANGE = 2.0
 _JUMP = 6.0
+_SURROUNDED = 0.8
 MAX_OBJECTS = 100
 
 
@@ -42,6 +43,7 @@ def static_segments(
         1 for the background, 2, 3, … for objects from left to right.
     """
     from sec_lab.segmentation import _layer_kernels as kernels
+    from sec_lab.segmentation.potts import PottsParameters, superparamagnetic_clustering
 
     lab = smoothed_lab(image)
     bins = kernels.colour_bins(lab)
@@ -50,7 +52,12 @@ def static_segments(
     seeds = _seeds(unusual, rise, least_px)
     grown = _confirmed(_grown(lab, bins, seeds, rise, least_px), unusual, rise)
     whole = _parted(bins, grown, least_px)
-    return _coloured(image, bins, whole, least_px)
+    if not (whole > BACKGROUND).any():
+        return whole
+    domains = superparamagnetic_clustering(image, parameters=PottsParameters(minimum_size_px=max(10, least_px)))
+    if rise is not None:
+        whole = _with_things_on_top(bins, domains, whole, rise, least_px)
+    return _coloured(bins, domains, whole, least_px)
 
 
 def rise_above_plane(depth_m: NDArray[np.float32]) -> Floats:
@@ -318,24 +325,97 @@ def _table(bins: NDArray[np.uint16], where: NDArray[np.bool_]) -> Floats:
     return table
 
 
-def _differ(bins: NDArray[np.uint16], one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
+def _differ(bins: NDArray[np.uint16], one: NDArray[np.bool_], other: NDArray[np.bool_], *, by: float = 3.0) -> bool:
     """Whether the colours of two parts have little in common, either way."""
     tables = _table(bins, one), _table(bins, other)
     return all(
-        float((tables[1 - k][bins[where]] - tables[k][bins[where]]).mean()) > 3.0
-        for k, where in enumerate((one, other))
+        float((tables[1 - k][bins[where]] - tables[k][bins[where]]).mean()) > by for k, where in enumerate((one, other))
     )
 
 
-def _coloured(image: NDArray[np.uint8], bins: NDArray[np.uint16], labels: Labels, least_px: int) -> Labels:
+def _with_things_on_top(
+    bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Labels, rise: Floats, least_px: int
+) -> Labels:
+    """Regions in two where something of other colours rises out of them, surrounded by the rest: what is on a plate.
+
+    Depth from matched windows reaches beyond borders, so that it only says which domains of colour belong to the thing.
+    """
+    import cv2
+
+    smooth = cv2.medianBlur(np.nan_to_num(rise, nan=0.0, posinf=0.0, neginf=0.0), 5)
+    parted = labels.copy()
+    number = int(labels.max())
+    for slot in np.unique(labels[labels > BACKGROUND]):
+        region = labels == slot
+        sizes = np.bincount(domains[region])
+        floor = region & (domains == int(np.argmax(sizes)))
+        level = float(np.median(smooth[floor]))
+        high = [
+            domain
+            for domain in np.flatnonzero(sizes)
+            if np.median(smooth[region & (domains == domain)]) >= level + _RISES
+        ]
+        raised = (region & np.isin(domains, high)).astype(np.uint8)
+        raised = cv2.morphologyEx(raised, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        n, parts, _, _ = cv2.connectedComponentsWithStats(raised, connectivity=4)
+        for part in range(1, n):
+            piece = _filled(parts == part)
+            for domain in np.setdiff1d(np.flatnonzero(sizes >= least_px), [*high, np.argmax(sizes)]):
+                # The lower part of what rises is no higher than the floor: its colours tell whose it is.
+                lower = region & (domains == domain) & ~piece
+                if (
+                    _touch(piece, lower)
+                    and _is_surrounded(lower | piece, region)
+                    and _is_like(bins, lower, piece, floor)
+                ):
+                    piece = _filled(piece | lower)
+            rest = region & (parted == slot) & ~piece
+            if number >= MAX_OBJECTS or not 1.5 * least_px <= piece.sum() <= 0.6 * region.sum():
+                continue
+            if rest.sum() < least_px or not _is_surrounded(piece, region) or not _differ(bins, piece, rest, by=1.0):
+                continue
+            number += 1
+            parted[piece] = number
+    return parted
+
+
+def _touch(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
+    import cv2
+
+    return bool((cv2.dilate(one.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)[other].any())
+
+
+def _is_like(
+    bins: NDArray[np.uint16], part: NDArray[np.bool_], one: NDArray[np.bool_], other: NDArray[np.bool_]
+) -> bool:
+    """Whether a part has the colours of one region rather than those of another."""
+    return bool((_table(bins, other)[bins[part]] - _table(bins, one)[bins[part]]).mean() > 1.0)
+
+
+def _filled(piece: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A connected piece without holes."""
+    import cv2
+
+    outlines, _ = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = np.zeros(piece.shape, np.uint8)
+    cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)
+    return filled > 0
+
+
+def _is_surrounded(piece: NDArray[np.bool_], region: NDArray[np.bool_]) -> bool:
+    """Whether most of what lies around a piece, as far as half its radius, belongs to its region."""
+    import cv2
+
+    reach = max(3, round(0.5 * float(np.sqrt(piece.sum() / np.pi))))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    around = (cv2.dilate(piece.astype(np.uint8), disc) > 0) & ~piece
+    return bool(region[around].mean() > _SURROUNDED)
+
+
+def _coloured(bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Labels, least_px: int) -> Labels:
     """Regions with a large part of another colour in two: what a cup holds. Rims and bands stay."""
     import cv2
 
-    from sec_lab.segmentation.potts import PottsParameters, superparamagnetic_clustering
-
-    if not (labels > BACKGROUND).any():
-        return labels
-    domains = superparamagnetic_clustering(image, parameters=PottsParameters(minimum_size_px=max(10, least_px)))
     parted = labels.copy()
     number = int(labels.max())
     for slot in np.unique(labels[labels > BACKGROUND]):

@@ -87,3 +87,39 @@ class TestStaticSegments:
     def test_a_hole_is_filled(self) -> None:
         found = self.segments([Block((50, 60), RED, 40, 40), Block((50, 60), TABLE, 10, 10)])
         assert found[50, 60] == found[35, 45] == 2
+
+
+class TestThingsOnThings:
+    """A plate that covers most of what is seen, and something small of another colour on it."""
+
+    plate = Block((48, 60), (225, 225, 220), 46, 58)
+
+    def segments(self, colour: tuple[int, int, int], height: float, *, place: tuple[int, int] = (48, 60)) -> Any:
+        """``height``: how far the small thing stands out of the plate, in units of the noise of depth."""
+        small = Block(place, colour, 14, 14)
+        rng = np.random.default_rng(3)
+        picture, truth = drawn(Moment([self.plate, small]), rng.normal(0, 2, (HEIGHT, WIDTH, 3)))
+        inverse = 1 / plane() + rng.normal(0, 0.01, (HEIGHT, WIDTH))
+        inverse += 0.05 * (truth == 1) + (0.05 + 0.01 * height) * (truth == 2)
+        return static_segments(picture, depth_m=(1 / inverse).astype(np.float32)), truth
+
+    def test_what_rises_from_a_plate_is_a_thing(self) -> None:
+        found, truth = self.segments(RED, 9)
+        assert set(np.unique(found)) == {1, 2, 3}
+        thing, plate = found[48, 60], found[30, 36]
+        assert thing != plate
+        assert ((found == thing) & (truth == 2)).sum() > 0.8 * (found == thing).sum()
+        assert ((found == thing) & (truth == 2)).sum() > 0.8 * (truth == 2).sum()
+
+    def test_a_painted_mark_stays_with_the_plate(self) -> None:
+        found, _ = self.segments(RED, 0)
+        assert set(np.unique(found)) == {1, 2}
+
+    def test_a_bulge_of_the_same_colour_stays_with_the_plate(self) -> None:
+        found, _ = self.segments(self.plate.colour, 9)
+        assert set(np.unique(found)) == {1, 2}
+
+    def test_the_cap_of_a_bottle_stays_with_it(self) -> None:
+        """It rises and has its own colour, but lies at the border of its region."""
+        found, _ = self.segments(RED, 9, place=(33, 60))
+        assert set(np.unique(found)) == {1, 2}
