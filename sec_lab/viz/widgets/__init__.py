@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sec_lab.viz.widgets.explorer import ChainExplorer as ChainExplorer
     from sec_lab.viz.widgets.explorer import chain_explorer as chain_explorer
+    from sec_lab.viz.widgets.own_movie import OwnMovie as OwnMovie
+    from sec_lab.viz.widgets.own_movie import own_movie as own_movie
     from sec_lab.viz.widgets.picture import ClickablePicture as ClickablePicture
 
 _MODULE_OF = {
     "ChainExplorer": "explorer",
     "ClickablePicture": "picture",
+    "OwnMovie": "own_movie",
     "chain_explorer": "explorer",
+    "own_movie": "own_movie",
 }
 __all__ = list(_MODULE_OF)
 
