@@ -170,7 +170,7 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
             os.fspath(masks), description="masks", placeholder="of a tracker, if you have any", layout=wide,
             style=labelled,
         )  # fmt: skip
-        self._open = _button("open", "folder-open", "observe the movie", self.open)
+        self._open = _button("open", "folder-open", "observe the movie", self.observe_now)
         self._upload = Upload(f"or upload a movie (up to {MOST_MB} MB):")
         self._upload.on_file(self._uploaded)
         self._upload.on_problem(self.explorer.say)
@@ -190,12 +190,12 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
         self.add_class("sec-lab-own-movie")
         self.explorer.on_changed.append(self._changed)
         if os.fspath(path) or os.fspath(masks):
-            self.open()
+            self.observe_now()
 
     def __repr__(self) -> str:
         return "OwnMovie()"
 
-    def open(self) -> None:
+    def observe_now(self) -> None:
         """Observe what the fields name, in a thread."""
         self._below.layout.display = "none"
         self.explorer.explore(partial(self._look, self._path.value.strip(), self._masks.value.strip()))
@@ -236,7 +236,7 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
     def _uploaded(self, path: Path) -> None:
         self._path.value, self._masks.value = str(path), ""
         self._name.value = path.stem
-        self.open()
+        self.observe_now()
 
     def _changed(self) -> None:
         self._table.value = self._said.value = ""
