@@ -1,5 +1,6 @@
 """One's own movie in five minutes: open or upload it, see its chain, name and merge, compare, save."""
 
+import html
 import os
 from collections.abc import Callable
 from functools import partial
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _N_SHOWN = 10
+_SHOWN = {"temporal": "ψ temporal in %", "spatial": "ψ spatial in %"}
 
 
 def own_movie(
@@ -263,6 +265,15 @@ def _button(words: str, icon: str, tooltip: str, act: Callable[[], object]) -> i
 def _as_table(table: "pd.DataFrame") -> str:
     """The most similar movies as an HTML table."""
     shown = table.head(_N_SHOWN)
-    named = shown.rename(columns={"temporal": "ψ_temporal in %", "spatial": "ψ_spatial in %"})
-    rounded = named[["ψ_temporal in %", "ψ_spatial in %"]].round(1)
-    return f"{rounded.to_html(escape=True, border=0)}<p>the first {len(shown)} of {len(table)} movies</p>"
+    cell = '<td style="padding: 0 0.8em; text-align: {}">{}</td>'
+    rows = [
+        cell.format("left", html.escape(str(name)))
+        + "".join(cell.format("right", f"{row[what]:.1f}") for what in _SHOWN)
+        for name, row in shown.iterrows()
+    ]
+    heads = "".join(f'<th style="padding: 0 0.8em">{head}</th>' for head in ("movie", *_SHOWN.values()))
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    return (
+        f'<table style="line-height: 1.5"><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>'
+        f"the first {len(shown)} of {len(table)} movies"
+    )
