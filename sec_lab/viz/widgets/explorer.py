@@ -158,11 +158,12 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         """What a notebook stores; while the report is made also the explorer as a page without a kernel shows it."""
-        bundle = super()._repr_mimebundle_(**options)
+        return super()._repr_mimebundle_(**options) | self.for_pages()
+
+    def for_pages(self) -> dict[str, str]:
+        """While the report is made, what its pages show instead of a live explorer, by kind of output."""
         book = self.wait().book if os.environ.get(FOR_PAGES) else None
-        if book is not None:
-            bundle[SCRUBBER] = scrubber_html(book)
-        return bundle
+        return {} if book is None else {SCRUBBER: scrubber_html(book)}
 
     def __repr__(self) -> str:
         # Nothing in a stored notebook changes from one execution to the next but the number of the widget.

@@ -197,6 +197,9 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
     def __repr__(self) -> str:
         return "OwnMovie()"
 
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        return super()._repr_mimebundle_(**options) | self.explorer.for_pages()
+
     def observe_now(self) -> None:
         """Observe what the fields name, in a thread."""
         self._below.layout.display = "none"
