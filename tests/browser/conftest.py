@@ -72,13 +72,14 @@ class Lab:
 
         page.on("console", hear)
         page.on("pageerror", lambda error: said.append(str(error)) if OURS.search(f"{error} {error.stack}") else None)
-        where = "lab/tree" if front == "lab" else "notebooks"
+        # A workspace of its own, or JupyterLab would open what was open before.
+        where = f"lab/workspaces/w{len(self.pages)}/tree" if front == "lab" else "notebooks"
         page.goto(f"{self.address}/{where}/{name}?token={self.token}")
         page.wait_for_selector(".jp-Notebook .jp-CodeCell .cm-content", timeout=RUN_MS)
         page.wait_for_function(IS_READY, timeout=RUN_MS)
         if dark:
             page.evaluate("() => void jupyterapp.commands.execute('apputils:change-theme', {theme: 'JupyterLab Dark'})")
-            page.wait_for_selector("body[data-jp-theme-light=false]", timeout=RUN_MS)
+            page.wait_for_selector("body[data-jp-theme-light=false]", state="attached", timeout=RUN_MS)
         page.evaluate("() => void jupyterapp.commands.execute('notebook:run-all-cells')")
         last = page.locator(".jp-CodeCell .jp-InputPrompt").nth(len(sources) - 1)
         deadline = time.monotonic() + RUN_MS / 1000
@@ -105,6 +106,10 @@ def running_lab(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> I
     environment |= {"JUPYTERLAB_SETTINGS_DIR": str(home / "settings"), "IPYTHONDIR": str(home / "ipython")}
     environment |= {"JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces"), "JUPYTER_TOKEN": token}
     environment.pop("MPLBACKEND", None)
+    # Asked nothing, and asking nobody.
+    news = home / "settings" / "@jupyterlab" / "apputils-extension" / "notification.jupyterlab-settings"
+    news.parent.mkdir(parents=True)
+    news.write_text('{"fetchNews": "false", "checkForUpdates": false}')
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ServerApp.ip=127.0.0.1"]
     command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0", f"--ServerApp.root_dir={folder}"]
     command += ["--LabApp.expose_app_in_browser=True", "--JupyterNotebookApp.expose_app_in_browser=True"]
