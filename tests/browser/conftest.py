@@ -72,7 +72,8 @@ class Lab:
 
         page.on("console", hear)
         page.on("pageerror", lambda error: said.append(str(error)) if OURS.search(f"{error} {error.stack}") else None)
-        where = "lab/tree" if front == "lab" else "notebooks"
+        # A workspace of its own, or JupyterLab would open what was open before.
+        where = f"lab/workspaces/w{len(self.pages)}/tree" if front == "lab" else "notebooks"
         page.goto(f"{self.address}/{where}/{name}?token={self.token}")
         page.wait_for_selector(".jp-Notebook .jp-CodeCell .cm-content", timeout=RUN_MS)
         page.wait_for_function(IS_READY, timeout=RUN_MS)

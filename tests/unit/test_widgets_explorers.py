@@ -228,7 +228,7 @@ def test_segmentation_explorer_segments_the_frame_of_its_controls() -> None:
     assert np.array_equal(explorer.labels, expected)
     assert f"{int(expected.max())} segment" in explorer.said.value
     assert f"3 true ones are covered by {covering(expected, truth[2]):.3f}" in explorer.said.value
-    assert explorer.picture.png.startswith(b"\x89PNG")
+    assert explorer.picture.png.startswith(b"\xff\xd8")
 
 
 def test_segmentation_explorer_says_what_was_clicked_in_any_of_its_pictures() -> None:

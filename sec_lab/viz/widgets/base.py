@@ -1,6 +1,5 @@
 """What all explorers have: controls above what they show, a line for what went wrong, and a bar while they work."""
 
-import html
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
@@ -8,14 +7,17 @@ from typing import Any, ParamSpec, TypeVar
 
 import ipywidgets as widgets
 
-from sec_lab.viz.svg.paper import note
 from sec_lab.viz.widgets.latest import TROUBLES, Latest
+from sec_lab.viz.widgets.sentences import as_alert, sentence_of
 
 T = TypeVar("T")
 Given = ParamSpec("Given")
 
 LABELS = {"description_width": "initial"}
 """Style of controls whose label is as long as it has to be."""
+
+WIDE = {"width": "360px"}
+"""Layout of sliders: room for the label and for the slider."""
 
 
 class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
@@ -43,8 +45,7 @@ class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
 
     def say_trouble(self, text: str) -> None:
         """Show a sentence that says what went wrong, or nothing."""
-        mark = '<span style="border-left:4px solid #e2553f;padding-left:8px" role="alert">'
-        self.trouble.value = note(f"{mark}{html.escape(text)}</span>") if text else ""
+        self.trouble.value = as_alert(text)
 
     @contextmanager
     def guard(self) -> Iterator[None]:
@@ -54,7 +55,7 @@ class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
         try:
             yield
         except TROUBLES as error:
-            self.say_trouble(str(error))
+            self.say_trouble(sentence_of(error))
 
     def on_move(self, controls: Sequence[widgets.Widget], update: Callable[[], object]) -> None:
         """Call a function whenever one of some controls has another value; what goes wrong becomes a sentence."""
@@ -96,7 +97,7 @@ def never_raises(make: Callable[Given, Explorer]) -> Callable[Given, Explorer]:
         except TROUBLES as error:
             explorer = Explorer()
             explorer.show()
-            explorer.say_trouble(str(error))
+            explorer.say_trouble(sentence_of(error))
             return explorer
 
     return made

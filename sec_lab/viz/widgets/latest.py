@@ -6,6 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
+from sec_lab.viz.widgets.sentences import sentence_of
+
 T = TypeVar("T")
 
 TROUBLES = (TypeError, ValueError, OSError)
@@ -172,10 +174,10 @@ class Latest(Generic[T]):
         except StaleError:
             request.is_dropped = True
         except TROUBLES as error:
-            request.error = str(error)
+            request.error = sentence_of(error)
         except Exception as error:
             # A fault of this program: told in the widget, and where it is in the log.
-            request.error = f"{type(error).__name__}: {error}"
+            request.error = sentence_of(error)
             logging.getLogger(__name__).exception("work of a widget")
         finally:
             with self._lock:

@@ -17,7 +17,7 @@ from sec_lab.viz.svg.match import (
     with_permutation,
 )
 from sec_lab.viz.svg.paper import data_address, sentence
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 
 Pictures: TypeAlias = Mapping[int, ArrayLike]
@@ -47,13 +47,15 @@ class MatchExplorer(Explorer):
             description="divide by the", style={**LABELS, "button_width": "auto"},
         )  # fmt: skip
         self.tolerance = widgets.IntSlider(
-            value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS
+            value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS, layout=WIDE
         )
         self.temporal_input = widgets.ToggleButtons(
             options=[("ξ_o", "original"), ("ξ_d", "derived")], description="columns of",
             style={**LABELS, "button_width": "auto"},
         )  # fmt: skip
-        self.permutation = widgets.IntSlider(value=1, min=1, max=1, description="permutation (no.)", style=LABELS)
+        self.permutation = widgets.IntSlider(
+            value=1, min=1, max=1, description="permutation (no.)", style=LABELS, layout=WIDE
+        )
         self.names = widgets.ToggleButtons(
             options=[("ρ", "relations"), ("names", "names")], description="rows as",
             style={**LABELS, "button_width": "auto"},

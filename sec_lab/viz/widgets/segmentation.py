@@ -14,15 +14,13 @@ from sec_lab.segmentation import Segmentation
 from sec_lab.segmentation.potts import DEFAULT, ColourSpace, PottsParameters
 from sec_lab.viz.exploring import SegmentedFrame, beside_each_other, segmented_frame
 from sec_lab.viz.frame_shelf import FrameShelf
-from sec_lab.viz.svg.paper import png, sentence
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.svg.paper import jpeg, sentence
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.latest import Turn
 from sec_lab.viz.widgets.picture import ClickablePicture
 
 Movie: TypeAlias = Recording | str | os.PathLike[str] | ArrayLike
 Truth: TypeAlias = Segmentation | ArrayLike
-
-_WIDE = {"width": "340px"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,17 +57,17 @@ class SegmentationExplorer(Explorer):
         self._kept = parameters
         self.frame = widgets.IntSlider(
             min=0, max=n_frames - 1, description=f"frame (no. of {n_frames})", style=LABELS, disabled=n_frames == 1,
-            layout=_WIDE,
+            layout=WIDE,
         )  # fmt: skip
         self.alpha = widgets.FloatSlider(
             value=parameters.alpha, min=0.1, max=10, step=0.1, description="α (of the mean colour difference)",
-            style=LABELS, layout=_WIDE, readout_format=".1f",
+            style=LABELS, layout=WIDE, readout_format=".1f",
         )  # fmt: skip
         self.anneal_sweeps = _whole("sweeps of annealing (number)", parameters.anneal_sweeps, 1, 60)
         self.smooth_sweeps = _whole("sweeps of smoothing (number)", parameters.smooth_sweeps, 0, 12)
         self.blur_sigma_px = widgets.FloatSlider(
             value=parameters.blur_sigma_px, min=0, max=3, step=0.1, description="blur σ (px)", style=LABELS,
-            layout=_WIDE, readout_format=".1f",
+            layout=WIDE, readout_format=".1f",
         )  # fmt: skip
         self.minimum_size_px = _whole("minimum size (px)", parameters.minimum_size_px, 1, 1000)
         self.minimum_thickness_px = _whole("minimum thickness (px)", parameters.minimum_thickness_px, 0, 12)
@@ -124,7 +122,7 @@ class SegmentationExplorer(Explorer):
         labels = [found.labels] if truth is None else [found.labels, truth]
         picture = beside_each_other(frame.image, *labels)
         step = -(-frame.image.shape[0] // picture.shape[0])
-        return _Shown(place, frame.index, found, truth, png(picture), step)
+        return _Shown(place, frame.index, found, truth, jpeg(picture), step)
 
     def _show(self, shown: _Shown) -> None:
         self._shown = shown
@@ -188,7 +186,7 @@ def segmentation_explorer(
 
 def _whole(description: str, value: int, low: int, high: int) -> widgets.IntSlider:
     return widgets.IntSlider(
-        value=value, min=low, max=max(high, value), description=description, style=LABELS, layout=_WIDE
+        value=value, min=low, max=max(high, value), description=description, style=LABELS, layout=WIDE
     )
 
 

@@ -12,7 +12,7 @@ from sec_lab.viz.exploring import Seen, chain_of
 from sec_lab.viz.svg.curves import curves_svg
 from sec_lab.viz.svg.paper import sentence
 from sec_lab.viz.svg.table import cell_at, moved, table_layout, table_svg, table_words
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 from sec_lab.viz.widgets.match import MatchExplorer, Pictures
 
@@ -67,11 +67,11 @@ class TableExplorer(Explorer):
             self._errors.columns = [str(name).replace("_", " ") for name in self._errors.columns]
         self.threshold = widgets.IntSlider(
             value=round(threshold_percent), min=0, max=100, description="threshold of similarity (%)", style=LABELS,
-            layout={"width": "420px"},
+            layout=WIDE,
         )  # fmt: skip
         self.said, self.chosen = widgets.HTML(), widgets.HTML()
         hint = "click a cell, or move with the arrow keys, to open the pair"
-        self.table, self.errors = Drawing(takes_clicks=True, tooltip=hint), Drawing()
+        self.table, self.errors = Drawing(takes_clicks=True, hint=hint), Drawing()
         self.pair = widgets.VBox()
         self.show(self.threshold, self.said, row_of(self.table, self.errors), self.chosen, self.pair)
         self.chosen.value = sentence(f"No pair is open: {hint}.")
