@@ -59,7 +59,7 @@ _STYLE = """
 .sec-lab-drawing { color: var(--jp-ui-font-color1, inherit); overflow-x: auto; }
 .sec-lab-drawing text { pointer-events: none; }
 .sec-lab-clickable { cursor: pointer; touch-action: manipulation; width: fit-content; max-width: 100%; }
-.sec-lab-clickable:focus { outline: 2px solid var(--jp-brand-color1, #1f5fbf); outline-offset: 2px; }
+.sec-lab-clickable:focus { outline: 2px solid var(--jp-brand-color1, #1f5fbf); outline-offset: -2px; }
 """
 
 
