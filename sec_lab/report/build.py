@@ -20,7 +20,15 @@ from tqdm import tqdm
 
 from sec_lab.files import write_whole
 from sec_lab.report.execution import NotebookFailure, code_cells, execute, read_notebook
-from sec_lab.report.pages import NotebookSummary, network_loads, notebook_html, sections_of, summarise, template
+from sec_lab.report.pages import (
+    FOR_PAGES,
+    NotebookSummary,
+    network_loads,
+    notebook_html,
+    sections_of,
+    summarise,
+    template,
+)
 
 Status = Literal["executed", "unchanged", "outdated", "stored", "failed", "absent"]
 
@@ -203,7 +211,8 @@ def _entry(path: Path, source: NotebookNode, copies: Path, *, project: bytes, wa
 def _executed(entry: _Entry, copies: Path, *, on_cell: Callable[[], object]) -> _Entry:
     """Execute a notebook and keep the copy; a failure leaves what was shown before."""
     try:
-        done = execute(entry.source, folder=entry.path.parent, on_cell=on_cell)
+        # Explorers then leave behind what scrubs on a page without a kernel.
+        done = execute(entry.source, folder=entry.path.parent, on_cell=on_cell, variables={FOR_PAGES: "1"})
     except NotebookFailure as failure:
         return replace(entry, status="failed", error=f"{entry.path.name}, {failure}")
     done.metadata[_KEY] = entry.key

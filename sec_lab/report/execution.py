@@ -3,7 +3,7 @@
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +82,13 @@ def code_cells(notebook: NotebookNode) -> list[NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code" and cell.source.strip()]
 
 
-def execute(notebook: NotebookNode, *, folder: Path, on_cell: Callable[[], object] = lambda: None) -> NotebookNode:
+def execute(
+    notebook: NotebookNode,
+    *,
+    folder: Path,
+    on_cell: Callable[[], object] = lambda: None,
+    variables: Mapping[str, str] | None = None,
+) -> NotebookNode:
     """Execute a notebook in order, in a fresh kernel of this very interpreter.
 
     Parameters
@@ -93,6 +99,8 @@ def execute(notebook: NotebookNode, *, folder: Path, on_cell: Callable[[], objec
         Where the kernel works, as a rule the notebook's own folder.
     on_cell : callable, optional
         Called after every executed cell, for progress.
+    variables : mapping of str to str, optional
+        Environment variables of the kernel, beside those of this process.
 
     Returns
     -------
@@ -116,6 +124,7 @@ def execute(notebook: NotebookNode, *, folder: Path, on_cell: Callable[[], objec
     fresh.metadata.pop("widgets", None)
     # The notebooks' own backend draws their figures, whatever this process was told to use.
     environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
+    environment |= variables or {}
     running: list[NotebookNode] = []
 
     def started(cell: NotebookNode, **_: Any) -> None:

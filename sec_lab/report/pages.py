@@ -1,4 +1,7 @@
-"""Executed notebooks as HTML that needs nothing from the network: no scripts, pictures embedded, formulas as MathML."""
+"""Executed notebooks as HTML that needs nothing from the network: pictures embedded, formulas as MathML.
+
+There is no script but the one of an explorer that scrubs, which stands beside its pictures.
+"""
 
 import html
 import os
@@ -16,6 +19,8 @@ from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from nbformat import NotebookNode
 
+# As of sec_lab.viz.widgets.scrubber, which is imported by the kernels that show widgets only.
+FOR_PAGES, SCRUBBER = "SEC_LAB_FOR_PAGES", "application/vnd.sec-lab.scrubber+html"
 _WIDGET = "application/vnd.jupyter.widget-view+json"
 _PICTURES = ("image/png", "image/jpeg", "image/svg+xml")
 _WIDGET_NOTE = (
@@ -182,8 +187,9 @@ def _make_still(output: NotebookNode, *, alternative: str) -> None:
     data: dict[str, Any] = output.get("data", {})
     data.pop("application/javascript", None)
     if _WIDGET in data:
+        scrubber = data.get(SCRUBBER, "")
         data.clear()
-        data["text/html"] = _WIDGET_NOTE
+        data["text/html"] = scrubber or _WIDGET_NOTE
     if "text/latex" in data and "text/html" not in data:
         tex = data.pop("text/latex").strip().strip("$").removeprefix(r"\displaystyle")
         data["text/html"] = _mathml(tex, display="block")

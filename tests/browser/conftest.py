@@ -79,7 +79,7 @@ class Lab:
         page.wait_for_function(IS_READY, timeout=RUN_MS)
         if dark:
             page.evaluate("() => void jupyterapp.commands.execute('apputils:change-theme', {theme: 'JupyterLab Dark'})")
-            page.wait_for_selector("body[data-jp-theme-light=false]", timeout=RUN_MS)
+            page.wait_for_selector("body[data-jp-theme-light=false]", state="attached", timeout=RUN_MS)
         page.evaluate("() => void jupyterapp.commands.execute('notebook:run-all-cells')")
         last = page.locator(".jp-CodeCell .jp-InputPrompt").nth(len(sources) - 1)
         deadline = time.monotonic() + RUN_MS / 1000

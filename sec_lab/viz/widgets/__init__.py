@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from sec_lab.viz.widgets.learning import learning_explorer as learning_explorer
     from sec_lab.viz.widgets.match import match_explorer as match_explorer
     from sec_lab.viz.widgets.noise import noise_explorer as noise_explorer
+    from sec_lab.viz.widgets.own_movie import OwnMovie as OwnMovie
+    from sec_lab.viz.widgets.own_movie import own_movie as own_movie
     from sec_lab.viz.widgets.picture import ClickablePicture as ClickablePicture
     from sec_lab.viz.widgets.segmentation import segmentation_explorer as segmentation_explorer
     from sec_lab.viz.widgets.table import table_explorer as table_explorer
@@ -20,12 +22,14 @@ if TYPE_CHECKING:
 _MODULE_OF = {
     "ChainExplorer": "explorer",
     "ClickablePicture": "picture",
+    "OwnMovie": "own_movie",
     "chain_explorer": "explorer",
     "learning_explorer": "learning",
     "match_explorer": "match",
     "noise_explorer": "noise",
     "segmentation_explorer": "segmentation",
     "table_explorer": "table",
+    "own_movie": "own_movie",
 }
 __all__ = list(_MODULE_OF)
 

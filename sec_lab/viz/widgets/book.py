@@ -12,7 +12,7 @@ from sec_lab.segmentation.record import MAX_LABEL
 from sec_lab.viz.style import RELATION_WORD
 from sec_lab.viz.widgets.chain_table import LIGHT, ChainTable, Theme
 from sec_lab.viz.widgets.panels import FramePanels, jpeg_bytes, told_segment
-from sec_lab.viz.widgets.seen import KeptFrame, Seen, merged
+from sec_lab.viz.widgets.seen import KeptFrame, Seen, Tell, merged
 
 _WIDTH_PX = 980
 
@@ -79,7 +79,7 @@ class ChainBook:
             background = int(new_labels[background])
         self.panels = FramePanels(
             self.observation,
-            self.seen.frames[0] if self.seen.frames else None,
+            next((frame for frame in self.seen.frames if frame.has_labels), None) or next(iter(self.seen.frames), None),
             background=background,
             has_depth=self.seen.has_depth,
             new_labels=new_labels,
@@ -197,8 +197,10 @@ class ChainBook:
         self._remember()
         self._set(_named(self.observation, names))
 
-    def merge(self, labels: Sequence[int]) -> None:
+    def merge(self, labels: Sequence[int], *, tell: Tell | None = None) -> None:
         """Take segments together as one (over-segmentation, §2.11), and make the chain anew; the first stays.
+
+        Nothing is changed if ``tell``, which is called with the number of frames done and of all, raises.
 
         Raises
         ------
@@ -216,7 +218,7 @@ class ChainBook:
         parts = [member for label in labels for member in members.pop(label, (label,))]
         groups = as_groups([*members.values(), parts])
         names = merged_names(self.observation.names, [labels])
-        found = merged(self.seen, groups)
+        found = merged(self.seen, groups, tell=tell)
         self._remember()
         self.groups = groups
         self._set(_named(found, names))

@@ -16,12 +16,14 @@ from sec_lab.segmentation import Segmentation
 from sec_lab.viz.widgets.book import ChainBook
 from sec_lab.viz.widgets.chain_table import DARK, LIGHT
 from sec_lab.viz.widgets.picture import ClickablePicture
+from sec_lab.viz.widgets.scrubber import FOR_PAGES, SCRUBBER, scrubber_html
 from sec_lab.viz.widgets.seen import How, Seen, see
 from sec_lab.viz.widgets.sentences import as_alert, sentence_of
 from sec_lab.viz.widgets.work import Work
 
 _AT_ONCE_S = 0.8
 _LEAST_INTERVAL_MS = 60
+_MERGED_AT_ONCE = 100
 _KEYS = (
     "← → frame, PageUp PageDown key frame, Home End, ↑ ↓ row, space play, m merge, u undo, Esc let go; "
     "click a cell, a row's name, a key frame or a segment"
@@ -90,22 +92,29 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
     Parameters
     ----------
     look : callable
-        Gives what is to be explored; called in a thread with ``tell(done, of)``.
+        Gives what is to be explored; called in a thread with ``tell(done, of)``. Without it there is nothing to see
+        yet.
 
     Attributes
     ----------
     book : ChainBook or None
         What is shown; None before the first frame is.
+    alert : str
+        The sentence that says what went wrong, or nothing.
+    on_changed : list of callable
+        Called when something else is shown, and when segments were named or merged.
     """
 
-    def __init__(self, look: Callable[..., Seen]) -> None:
+    def __init__(self, look: Callable[..., Seen] | None = None) -> None:
         self.book: ChainBook | None = None
+        self.alert = ""
         self.on_changed: list[Callable[[], object]] = []
         self._shown: tuple[Any, ...] = ()
         self._lit: tuple[Any, ...] = ()
         self._is_setting = False
+        self._told_of: Observation | None = None
         self._alert = ipywidgets.HTML("")
-        self._work = Work(on_done=self._show, on_failed=self._say)
+        self._work = Work(on_done=self._show, on_failed=self.say)
         self._frame = ClickablePicture(description="frame with segments and scene graph", tooltip=_KEYS)
         self._chain = ClickablePicture(description="event chain", tooltip=_KEYS)
         self._place = ipywidgets.IntSlider(
@@ -128,10 +137,15 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
         super().__init__([self._work, self._alert, self._body])
         self.add_class("sec-lab-explorer")
         self._listen()
-        self.explore(look)
+        self._body.layout.display = "none"
+        if look is not None:
+            self.explore(look)
 
     def explore(self, look: Callable[..., Seen]) -> None:
         """Show something else; called in a thread with ``tell(done, of)``."""
+        self._work.stop()
+        self._work.wait()
+        self.book = None
         self._body.layout.display = "none"
         self._alert.value = ""
         self._work.start(look)
@@ -141,6 +155,18 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
         """Wait until it is shown, for those who go on in Python."""
         self._work.wait(timeout_s)
         return self
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        """What a notebook stores; while the report is made also the explorer as a page without a kernel shows it."""
+        bundle = super()._repr_mimebundle_(**options)
+        book = self.wait().book if os.environ.get(FOR_PAGES) else None
+        if book is not None:
+            bundle[SCRUBBER] = scrubber_html(book)
+        return bundle
+
+    def __repr__(self) -> str:
+        # Nothing in a stored notebook changes from one execution to the next but the number of the widget.
+        return f"{type(self).__name__}()"
 
     def _laid_out(self) -> ipywidgets.Widget:
         row = partial(ipywidgets.HBox, layout={"flex_flow": "row wrap", "align_items": "center"})
@@ -181,26 +207,31 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
             self._play.interval = max(_LEAST_INTERVAL_MS, round(1000 * (times[1] - times[0])))  # type: ignore[operator]
         self._refresh()
         self._body.layout.display = ""
-        for changed in self.on_changed:
-            changed()
+        self._changed(self.book)
 
-    def _say(self, sentence: str) -> None:
+    def say(self, sentence: str) -> None:
+        """Show a sentence in red, or none."""
+        self.alert = sentence
         self._alert.value = as_alert(sentence)
 
     def _do(self, act: Callable[[ChainBook], object]) -> None:
         """Do something with the book, and show what came of it; what goes wrong is said."""
         if self.book is None:
             return
-        before = self.book.observation
-        self._say("")
+        self.say("")
         try:
             act(self.book)
             self._refresh()
         except Exception as error:  # noqa: BLE001 - an error in a callback would only reach a log that nobody reads
-            self._say(sentence_of(error))
-        if self.book.observation is not before:
-            for changed in self.on_changed:
-                changed()
+            self.say(sentence_of(error))
+        if self.book.observation is not self._told_of:
+            self._changed(self.book)
+
+    def _changed(self, book: ChainBook) -> None:
+        """Tell those who want to know that something else is seen now."""
+        self._told_of = book.observation
+        for changed in self.on_changed:
+            changed()
 
     def _moved(self, place: int) -> None:
         if not self._is_setting:
@@ -222,7 +253,11 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
             self._do(self._rename_chosen)
 
     def _merge_chosen(self, book: ChainBook) -> None:
-        book.merge(book.chosen)
+        if len(book.numbers) <= _MERGED_AT_ONCE:
+            book.merge(book.chosen)
+            return
+        chosen = list(book.chosen)
+        self._work.start(lambda tell: book.merge(chosen, tell=tell), on_done=lambda _: self._do(lambda _: None))
 
     def _let_go(self, book: ChainBook) -> None:
         book.row = None

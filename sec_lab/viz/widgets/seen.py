@@ -196,23 +196,25 @@ def see(
         movie = source if isinstance(source, Recording) else Recording.open(source)
     labelled = source if isinstance(source, Segmentation) else segmentation
     how = how or _WAYS[0]
-    if isinstance(labelled, Segmentation):
-        if movie is not None:
+    keeper = _Keeper(tell)
+    if movie is None:
+        assert isinstance(labelled, Segmentation)
+        found = observe(keeper.tapped(labelled), over_time=how[0], relations=how[1])
+    else:
+        if isinstance(labelled, Segmentation):
             check_fit(labelled, movie)
-        found = observe(labelled if movie is None else movie, segmentation=labelled, over_time=how[0], relations=how[1])
-        return Seen(found, tuple(_kept(movie, labelled, tell)), how, labelled.background)
-    assert movie is not None
-    keeper = _Keeper(movie.n_frames, tell)
-    segment = partial(keeper.segment, segmenter(labelled))
-    found = observe(movie, segmentation=segment, over_time=how[0], relations=how[1])
+            method: Callable[[Recording], Segmentation] = partial(_beside, labelled)
+        else:
+            method = segmenter(labelled)
+        found = observe(movie, segmentation=partial(keeper.segment, method), over_time=how[0], relations=how[1])
     kept = tuple(keeper.frames)
-    segments = found.segmentation
-    background = None if segments is None else segments.background
+    assert found.segmentation is not None
+    background = found.segmentation.background
     again = replace_segmentation(found, _segmentation_of(kept, background, found.names))
     return Seen(again, kept, how, background)
 
 
-def merged(seen: Seen, groups: Groups) -> Observation:
+def merged(seen: Seen, groups: Groups, *, tell: Tell | None = None) -> Observation:
     """What would have been seen if the fragments of each group had been one segment (§2.11).
 
     Label images are relabelled and steps 2 to 4 are done again on them; without any, the scene graphs alone decide
@@ -222,6 +224,8 @@ def merged(seen: Seen, groups: Groups) -> Observation:
     ----------
     seen : Seen
     groups : iterable of iterable of int
+    tell : callable, optional
+        As of :func:`see`.
 
     Returns
     -------
@@ -246,17 +250,29 @@ def merged(seen: Seen, groups: Groups) -> Observation:
     by_graphs = merge_segments(seen.observation, checked)
     if seen.found is None:
         return by_graphs
-    return _again(seen, checked, by_graphs.names, seen.found)
+    return _again(seen, checked, by_graphs.names, seen.found, tell)
 
 
-def _again(seen: Seen, groups: tuple[tuple[int, ...], ...], names: Names, how: How) -> Observation:
+def _again(
+    seen: Seen, groups: tuple[tuple[int, ...], ...], names: Names, how: How, tell: Tell | None = None
+) -> Observation:
     """Steps 2 to 4 once more, on the label images that were kept."""
     kept = tuple(frame for frame in seen.frames if frame.has_labels)
     whole = merged_segments(_segmentation_of(kept, seen.background, names), groups)
+    told = replace(whole, read=partial(_telling, whole, tell))
     if not seen.has_depth:
-        return observe(whole, over_time=how[0], relations=how[1], names=names)
-    movie = Recording(partial(_with_depth_only, kept), whole.size, len(kept), has_depth=True)
-    return observe(movie, segmentation=whole, over_time=how[0], relations=how[1], names=names)
+        found = observe(told, over_time=how[0], relations=how[1], names=names)
+    else:
+        movie = Recording(partial(_with_depth_only, kept), whole.size, len(kept), has_depth=True)
+        found = observe(movie, segmentation=told, over_time=how[0], relations=how[1], names=names)
+    return replace_segmentation(found, whole)
+
+
+def _telling(segmentation: Segmentation, tell: Tell | None) -> Iterator[tuple[int, Labels]]:
+    for done, labelled in enumerate(segmentation.numbered(), start=1):
+        yield labelled
+        if tell is not None:
+            tell(done, segmentation.n_frames)
 
 
 def replace_segmentation(observation: Observation, segmentation: Segmentation | None) -> Observation:
@@ -276,20 +292,21 @@ def replace_segmentation(observation: Observation, segmentation: Segmentation | 
 class _Keeper:
     """Keeps the frames of a movie while it is segmented, each with its label image."""
 
-    def __init__(self, n_frames: int | None, tell: Tell | None) -> None:
+    def __init__(self, tell: Tell | None) -> None:
         self.frames: list[KeptFrame] = []
-        self._n_frames, self._tell = n_frames, tell
+        self._tell = tell
+        self._n_frames: int | None = None
         self._ahead: dict[int, Frame] = {}
 
     def segment(self, method: Callable[[Recording], Segmentation], movie: Recording) -> Segmentation:
-        found = method(replace(movie, read=partial(self._read, movie)))
-        return Segmentation(
-            partial(self._label, found),
-            found.size,
-            found.frames,
-            found.background,
-            found.names,
-        )
+        """Segment a movie by a method, and keep what both read."""
+        self._n_frames = movie.n_frames
+        return self.tapped(method(replace(movie, read=partial(self._read, movie))))
+
+    def tapped(self, found: Segmentation) -> Segmentation:
+        """The same label images, which are kept when they are read."""
+        self._n_frames = self._n_frames or found.n_frames
+        return replace(found, read=partial(self._label, found))
 
     def _read(self, movie: Recording) -> Iterator[Frame]:
         for frame in movie:
@@ -299,12 +316,35 @@ class _Keeper:
     def _label(self, found: Segmentation) -> Iterator[tuple[int, Labels]]:
         self.frames.clear()
         for number, labels in found.numbered():
-            frame = self._ahead.pop(number, None)
-            for old in [index for index in self._ahead if index < number]:
-                del self._ahead[old]
-            self.frames.append(_joined(number, frame, labels))
-            _say(self._tell, len(self.frames), self._n_frames)
+            for index in sorted(index for index in self._ahead if index < number):
+                self._keep(_joined(index, self._ahead.pop(index), None))
+            self._keep(_joined(number, self._ahead.pop(number, None), labels))
             yield number, labels
+        for index in sorted(self._ahead):
+            self._keep(_joined(index, self._ahead.pop(index), None))
+
+    def _keep(self, frame: KeptFrame) -> None:
+        self.frames.append(frame)
+        _say(self._tell, len(self.frames), self._n_frames)
+
+
+def _beside(labelled: Segmentation, movie: Recording) -> Segmentation:
+    """Label images that are given, while the movie is read beside them."""
+    return replace(labelled, read=partial(_side_by_side, labelled, movie))
+
+
+def _side_by_side(labelled: Segmentation, movie: Recording) -> Iterator[tuple[int, Labels]]:
+    frames = iter(movie)
+    last = -1
+    for number, labels in labelled.numbered():
+        while last < number:
+            frame = next(frames, None)
+            if frame is None:
+                raise ValueError(f"masks: expected masks of frames that the recording has, got one of frame {number}")
+            last = frame.index
+        yield number, labels
+    for _ in frames:
+        pass
 
 
 def _kept(movie: Recording | None, segmentation: Segmentation | None, tell: Tell | None) -> Iterator[KeptFrame]:
@@ -345,11 +385,12 @@ def _say(tell: Tell | None, n: int, n_frames: int | None) -> None:
 
 
 def _segmentation_of(frames: tuple[KeptFrame, ...], background: int | None, names: Names) -> Segmentation:
-    labels = next(frame.labels for frame in frames)
+    labelled = tuple(frame for frame in frames if frame.has_labels)
+    labels = labelled[0].labels
     assert labels is not None
     height, width = labels.shape
-    numbers = [frame.number for frame in frames]
-    return Segmentation(partial(_labels_of, frames), (height, width), numbers, background, names)
+    numbers = [frame.number for frame in labelled]
+    return Segmentation(partial(_labels_of, labelled), (height, width), numbers, background, names)
 
 
 def _labels_of(frames: tuple[KeptFrame, ...]) -> Iterator[tuple[int, Labels]]:

@@ -56,7 +56,13 @@ class Work(ipywidgets.HBox):  # type: ignore[misc]
         """Whether there is work going on."""
         return self._thread is not None and self._thread.is_alive()
 
-    def start(self, function: Callable[[Tell], Any], *, unit: str = "frames") -> None:
+    def start(
+        self,
+        function: Callable[[Tell], Any],
+        *,
+        unit: str = "frames",
+        on_done: Callable[[Any], object] | None = None,
+    ) -> None:
         """Begin; what still runs is stopped first.
 
         Parameters
@@ -64,6 +70,8 @@ class Work(ipywidgets.HBox):  # type: ignore[misc]
         function : callable
         unit : str, optional
             What is counted.
+        on_done : callable, optional
+            Called this time instead of the usual one.
         """
         self.stop()
         self.wait(None)
@@ -71,7 +79,9 @@ class Work(ipywidgets.HBox):  # type: ignore[misc]
         self._bar.value, self._said.value, self.layout.display = 0, "", ""
         self._button.disabled = False
         # Daemonic, so that a kernel that is shut down need not wait for it.
-        self._thread = threading.Thread(target=self._run, args=(function, unit, self._stop), daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(function, unit, self._stop, on_done or self._on_done), daemon=True
+        )
         self._thread.start()
 
     def stop(self) -> None:
@@ -86,7 +96,13 @@ class Work(ipywidgets.HBox):  # type: ignore[misc]
             self._thread.join(timeout_s)
         return not self.is_running
 
-    def _run(self, function: Callable[[Tell], Any], unit: str, stop: threading.Event) -> None:
+    def _run(
+        self,
+        function: Callable[[Tell], Any],
+        unit: str,
+        stop: threading.Event,
+        on_done: Callable[[Any], object],
+    ) -> None:
         shown = -1
 
         def tell(done: int, of: int | None) -> None:
@@ -113,4 +129,4 @@ class Work(ipywidgets.HBox):  # type: ignore[misc]
             self._on_failed(sentence_of(error))
             return
         self.layout.display = "none"
-        self._on_done(given)
+        on_done(given)
