@@ -17,7 +17,8 @@ from sec_lab.noise import Noise, noisy_samples
 from sec_lab.noise_seeds import CLASS_SEEDS, LIFTING, SEEDS
 from sec_lab.noise_studies import noise_study
 from sec_lab.segmentation.potts import PottsParameters, superparamagnetic_clustering
-from sec_lab.segmentation.quality import covering
+from sec_lab.segmentation.quality import covering, quality
+from sec_lab.segmentation.tracking import TrackingParameters, track_segments
 from sec_lab.similarity import compare, permutations, similarity_table
 from sec_lab.viz.frame_shelf import FrameShelf
 from sec_lab.viz.widgets import (
@@ -229,6 +230,28 @@ def test_segmentation_explorer_segments_the_frame_of_its_controls() -> None:
     assert f"{int(expected.max())} segment" in explorer.said.value
     assert f"3 true ones are covered by {covering(expected, truth[2]):.3f}" in explorer.said.value
     assert explorer.picture.png.startswith(b"\xff\xd8")
+
+
+def test_segmentation_explorer_follows_a_movie_until_a_parameter_changes() -> None:
+    frames, truth = scene()
+    explorer = segmentation_explorer(frames, truth)
+    explorer.wait()
+    explorer.follow.click()
+    explorer.wait()
+    parameters = TrackingParameters(potts=explorer.parameters)
+    expected = list(track_segments(sl.Recording.from_frames(frames), parameters=parameters))
+    judged = quality(expected, truth)
+    n_labels = len(np.unique(np.stack(expected)))
+    assert f"followed through 3 frames: {n_labels} labels, covering {judged.covering:.3f}" in explorer.movie_said.value
+    for place in (0, 2, 1):
+        explorer.frame.value = place
+        explorer.wait()
+        assert np.array_equal(explorer.labels, expected[place])
+    explorer.alpha.value = 2.0
+    explorer.wait()
+    assert explorer.movie_said.value == ""
+    alone = superparamagnetic_clustering(frames[1], parameters=explorer.parameters)
+    assert np.array_equal(explorer.labels, alone)
 
 
 def test_segmentation_explorer_says_what_was_clicked_in_any_of_its_pictures() -> None:

@@ -39,6 +39,10 @@ class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
         self.work_bar = widgets.HBox([self.progress, self.cancel], layout={"visibility": "hidden"})
         self.add_class("sec-lab-explorer")
 
+    def __repr__(self) -> str:
+        # Not all the drawings that are in it: notebooks store it.
+        return f"{type(self).__name__}()"
+
     def show(self, *rows: widgets.Widget) -> None:
         """Put widgets below each other, the line for troubles first."""
         self.children = (self.trouble, *rows)

@@ -154,18 +154,21 @@ class Latest(Generic[T]):
         try:
             while (request := self._take()) is not None:
                 self._do(request)
-        finally:
-            with self._lock:
-                self._is_running = False
-            self._idle.set()
+        except BaseException:
+            self._end()
+            raise
 
     def _take(self) -> _Request[T] | None:
         with self._lock:
             request, self._next = self._next, None
             if request is None:
-                # From here on a new request starts a thread of its own.
-                self._is_running = False
+                # In one step with looking: from here on a new request starts a thread of its own.
+                self._end()
             return request
+
+    def _end(self) -> None:
+        self._is_running = False
+        self._idle.set()
 
     def _do(self, request: _Request[T]) -> None:
         turn = Turn(lambda: request.number != self._number, lambda *of: self._report(request, *of))
