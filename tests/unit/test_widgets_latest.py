@@ -123,6 +123,19 @@ def test_in_a_kernel_the_event_loop_shows_what_came_late() -> None:
     assert threads == [threading.main_thread()]
 
 
+def test_who_waits_in_the_kernel_sees_the_result_and_it_is_shown_once() -> None:
+    watch = Watch()
+
+    async def kernel() -> None:
+        watch.latest.ask(lambda _: time.sleep(0.05) or 7, patience_s=0)
+        watch.latest.wait(30)
+        assert watch.shown == [7]
+        await asyncio.sleep(0.05)
+
+    asyncio.run(asyncio.wait_for(kernel(), 30))
+    assert watch.shown == [7]
+
+
 def test_waiting_too_long_is_an_error() -> None:
     watch, go_on = Watch(), threading.Event()
     watch.latest.ask(lambda _: go_on.wait(30), patience_s=0)

@@ -1,5 +1,6 @@
 """What all explorers have: controls above what they show, a line for what went wrong, and a bar while they work."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
@@ -8,7 +9,9 @@ from typing import Any, ParamSpec, TypeVar
 import ipywidgets as widgets
 
 from sec_lab.viz.widgets.latest import TROUBLES, Latest
+from sec_lab.viz.widgets.scrubber import FOR_PAGES, SCRUBBER
 from sec_lab.viz.widgets.sentences import as_alert, sentence_of
+from sec_lab.viz.widgets.still import still_html
 
 T = TypeVar("T")
 Given = ParamSpec("Given")
@@ -50,6 +53,21 @@ class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
     def say_trouble(self, text: str) -> None:
         """Show a sentence that says what went wrong, or nothing."""
         self.trouble.value = as_alert(text)
+
+    def wait(self) -> None:
+        """Wait until everything that was asked for is shown."""
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]] | None:
+        """The slider that still moves on a page without a kernel, and where it can stand there; None: there is none."""
+        return None
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        """The live widget; while the report is made, also what scrubs in its page."""
+        bundle = super()._repr_mimebundle_(**options)
+        scrubbed = self.scrubbed() if os.environ.get(FOR_PAGES) else None
+        if isinstance(bundle, dict) and scrubbed is not None:
+            bundle[SCRUBBER] = still_html(self, *scrubbed, wait=self.wait)
+        return bundle
 
     @contextmanager
     def guard(self) -> Iterator[None]:

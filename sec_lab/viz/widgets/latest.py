@@ -58,6 +58,7 @@ class _Request(Generic[T]):
         self.result: Any = None
         self.error: str | None = None
         self.is_dropped = False
+        self.is_delivered = False
 
 
 class Latest(Generic[T]):
@@ -99,6 +100,7 @@ class Latest(Generic[T]):
         self._lock = threading.Lock()
         self._number = 0
         self._next: _Request[T] | None = None
+        self._late: _Request[T] | None = None
         self._is_running = False
         self._idle = threading.Event()
         self._idle.set()
@@ -140,7 +142,7 @@ class Latest(Generic[T]):
         self._at_rest()
 
     def wait(self, timeout_s: float = 60.0) -> None:
-        """Wait until nothing is left to do.
+        """Wait until nothing is left to do, and what was done is shown.
 
         Raises
         ------
@@ -149,6 +151,9 @@ class Latest(Generic[T]):
         """
         if not self._idle.wait(timeout_s):
             raise TimeoutError(f"widget: expected to be done in {timeout_s} s")
+        if self._late is not None:
+            # Whoever waits in the kernel's own thread keeps its event loop from showing it.
+            self._deliver(self._late)
 
     def _run(self) -> None:
         try:
@@ -187,6 +192,7 @@ class Latest(Generic[T]):
                 request.finished.set()
                 is_late = request.is_late
             if is_late:
+                self._late = request
                 self._hand_over(request, lambda: self._deliver(request))
 
     def _report(self, request: _Request[T], done: int, total: int) -> None:
@@ -200,8 +206,9 @@ class Latest(Generic[T]):
             request.loop.call_soon_threadsafe(call)
 
     def _deliver(self, request: _Request[T]) -> None:
-        if request.number != self._number or request.is_dropped:
+        if request.number != self._number or request.is_dropped or request.is_delivered:
             return
+        request.is_delivered = True
         self._at_rest()
         if request.error is not None:
             self._fail(request.error)

@@ -1,7 +1,7 @@
 """Learning explorer: add and remove demonstrations, move the weight threshold, watch the model (§2.9)."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias, get_args
+from typing import Any, TypeAlias, get_args
 
 import ipywidgets as widgets
 
@@ -88,6 +88,10 @@ class LearningExplorer(Explorer):
     def wait(self) -> None:
         """Wait until the model is shown."""
         self._worker.wait()
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The weight threshold, and where it can stand on a page without a kernel."""
+        return self.weight_threshold, [step / 10 for step in range(11)]
 
     def _tick_all(self, *, value: bool) -> None:
         self._is_ticking = True

@@ -1,6 +1,6 @@
 """Match explorer: two chains side by side, and what the readings of §2.6 make of them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias, get_args
 
 import ipywidgets as widgets
@@ -83,6 +83,10 @@ class MatchExplorer(Explorer):
     def match(self) -> Match:
         """The match, with the permutation that is shown."""
         return self._shown
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The tolerance, and where it can stand on a page without a kernel."""
+        return self.tolerance, range(0, 101, 10)
 
     def _compare_pair(self) -> None:
         normalizer: Normalizer = self.normalizer.value

@@ -1,7 +1,7 @@
 """Noise explorer: what a noise level does to a chain, and what is left of similarity and roles (§3.1)."""
 
-from collections.abc import Mapping
-from typing import get_args
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
 
 import ipywidgets as widgets
 import numpy as np
@@ -81,6 +81,10 @@ class NoiseExplorer(Explorer):
     def wait(self) -> None:
         """Wait until the curves are shown."""
         self._worker.wait()
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The noise level, and where it can stand on a page without a kernel."""
+        return self.p, [step / 10 for step in range(11)]
 
     @property
     def samples(self) -> NoisySamples:

@@ -128,6 +128,10 @@ class SegmentationExplorer(Explorer):
         self._follower.wait()
         self._worker.wait()
 
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The α, and where it can stand on a page without a kernel."""
+        return self.alpha, [float(step) for step in range(1, 11)]
+
     def _segment(self) -> None:
         place, parameters, followed = self.frame.value, self.parameters, self._followed
         self._worker.ask(lambda turn: self._work(place, parameters, followed, turn))
