@@ -1,7 +1,8 @@
 """What explorers compute at every move: models, noise, segments; nothing here knows of widgets."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -13,8 +14,10 @@ from sec_lab.learning import learn
 from sec_lab.noise import DEFAULT_NOISE, LEVELS, Noise, NoisySamples, compare_with_seed, noisy_samples
 from sec_lab.noise_studies import noise_study
 from sec_lab.observation import Observation
+from sec_lab.recording import Recording
 from sec_lab.segmentation.potts import PottsParameters, superparamagnetic_clustering
-from sec_lab.segmentation.quality import covering
+from sec_lab.segmentation.quality import Quality, covering, quality
+from sec_lab.segmentation.tracking import TrackingParameters, track_segments
 from sec_lab.similarity import compare
 from sec_lab.viz.tint import Tint
 
@@ -23,6 +26,9 @@ if TYPE_CHECKING:
 
 Seen: TypeAlias = EventChain | Observation
 Report: TypeAlias = Callable[[int, int], None]
+
+MOST_FRAMES = 400
+"""Frames of a movie that are followed: their labels are kept, 65 MB of 320×256 pixels."""
 
 _SHOWN_PX = 480
 
@@ -181,6 +187,66 @@ def segmented_frame(
     """
     labels = superparamagnetic_clustering(image, parameters=parameters, depth_m=depth_m)
     return SegmentedFrame(labels, None if truth is None else covering(labels, truth))
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedMovie:
+    """Segments of a movie followed from frame to frame.
+
+    Attributes
+    ----------
+    labels : (n, height, width) uint16
+    n_labels : int
+        Different ones in all of it.
+    quality : Quality or None
+        None where the truth is not known.
+    """
+
+    labels: NDArray[np.uint16]
+    n_labels: int
+    quality: Quality | None
+
+
+def followed_movie(
+    recording: Recording, *, parameters: PottsParameters, truth: Iterable[ArrayLike] | None = None,
+    most_frames: int = MOST_FRAMES, report: Report | None = None,
+) -> FollowedMovie:  # fmt: skip
+    """Follow segments through a movie, and hold them against the truth (§2.2).
+
+    Parameters
+    ----------
+    recording : Recording
+    parameters : PottsParameters
+        Of the lattice.
+    truth : iterable of (height, width) array_like of int, optional
+        One a frame.
+    most_frames : int, optional
+        The rest is left out.
+    report : callable, optional
+        Is told how many frames are done, and of how many.
+
+    Raises
+    ------
+    ValueError
+        As in :func:`~sec_lab.segmentation.tracking.track_segments` and :func:`~sec_lab.segmentation.quality.quality`.
+
+    Examples
+    --------
+    >>> frames = np.full((3, 40, 60, 3), 60, dtype=np.uint8)
+    >>> frames[:, 10:25, 10:30] = (200, 60, 60)
+    >>> found = followed_movie(Recording.from_frames(frames), parameters=PottsParameters(), truth=frames[..., 0] > 100)
+    >>> found.labels.shape, found.n_labels, found.quality.covering, found.quality.kept
+    ((3, 40, 60), 2, 1.0, 1.0)
+    """
+    total = most_frames if recording.n_frames is None else min(recording.n_frames, most_frames)
+    labels = []
+    for image in islice(track_segments(recording, parameters=TrackingParameters(potts=parameters)), total):
+        labels.append(np.asarray(image))
+        if report is not None:
+            report(len(labels), total)
+    judged = None if truth is None else quality(labels, islice(truth, len(labels)))
+    whole = np.stack(labels)
+    return FollowedMovie(whole, len(np.unique(whole)), judged)
 
 
 def beside_each_other(image: NDArray[np.uint8], *labels: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:

@@ -1,6 +1,8 @@
 """Explorers, driven by their controls: what they then say and show is what the library computes."""
 
 import gc
+import json
+import re
 import threading
 from collections.abc import Callable
 from xml.etree import ElementTree
@@ -16,8 +18,10 @@ from sec_lab.learning import learn
 from sec_lab.noise import Noise, noisy_samples
 from sec_lab.noise_seeds import CLASS_SEEDS, LIFTING, SEEDS
 from sec_lab.noise_studies import noise_study
+from sec_lab.report.pages import network_loads
 from sec_lab.segmentation.potts import PottsParameters, superparamagnetic_clustering
-from sec_lab.segmentation.quality import covering
+from sec_lab.segmentation.quality import covering, quality
+from sec_lab.segmentation.tracking import TrackingParameters, track_segments
 from sec_lab.similarity import compare, permutations, similarity_table
 from sec_lab.viz.frame_shelf import FrameShelf
 from sec_lab.viz.widgets import (
@@ -28,6 +32,8 @@ from sec_lab.viz.widgets import (
     table_explorer,
 )
 from sec_lab.viz.widgets.base import Explorer
+from sec_lab.viz.widgets.scrubber import FOR_PAGES, SCRUBBER
+from sec_lab.viz.widgets.still import shown_html, still_html
 
 TYPES = ["putting", "pouring"]
 
@@ -228,7 +234,29 @@ def test_segmentation_explorer_segments_the_frame_of_its_controls() -> None:
     assert np.array_equal(explorer.labels, expected)
     assert f"{int(expected.max())} segment" in explorer.said.value
     assert f"3 true ones are covered by {covering(expected, truth[2]):.3f}" in explorer.said.value
-    assert explorer.picture.png.startswith(b"\x89PNG")
+    assert explorer.picture.png.startswith(b"\xff\xd8")
+
+
+def test_segmentation_explorer_follows_a_movie_until_a_parameter_changes() -> None:
+    frames, truth = scene()
+    explorer = segmentation_explorer(frames, truth)
+    explorer.wait()
+    explorer.follow.click()
+    explorer.wait()
+    parameters = TrackingParameters(potts=explorer.parameters)
+    expected = list(track_segments(sl.Recording.from_frames(frames), parameters=parameters))
+    judged = quality(expected, truth)
+    n_labels = len(np.unique(np.stack(expected)))
+    assert f"followed through 3 frames: {n_labels} labels, covering {judged.covering:.3f}" in explorer.movie_said.value
+    for place in (0, 2, 1):
+        explorer.frame.value = place
+        explorer.wait()
+        assert np.array_equal(explorer.labels, expected[place])
+    explorer.alpha.value = 2.0
+    explorer.wait()
+    assert explorer.movie_said.value == ""
+    alone = superparamagnetic_clustering(frames[1], parameters=explorer.parameters)
+    assert np.array_equal(explorer.labels, alone)
 
 
 def test_segmentation_explorer_says_what_was_clicked_in_any_of_its_pictures() -> None:
@@ -307,6 +335,45 @@ def test_controls_have_labels_with_units() -> None:
         assert sliders or isinstance(explorer, Explorer)
         for slider in sliders:
             assert any(unit in slider.description for unit in units), slider.description
+
+
+@pytest.mark.parametrize("kind", ["match", "table", "learning", "noise", "segmentation"])
+def test_in_the_report_an_explorer_scrubs_over_one_slider(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    chains, classes = demonstrations(n=2)
+    make: dict[str, Callable[[], Explorer]] = {
+        "match": lambda: match_explorer(chains["putting 1"], chains["putting 2"], titles=("</script>", "b")),
+        "table": lambda: table_explorer(chains, classes),
+        "learning": lambda: learning_explorer(chains),
+        "noise": lambda: noise_explorer({"lifting": LIFTING}, n_samples=10),
+        "segmentation": lambda: segmentation_explorer(scene(1)[0]),
+    }
+    assert SCRUBBER not in make[kind]()._repr_mimebundle_()
+    monkeypatch.setenv(FOR_PAGES, "1")
+    explorer = make[kind]()
+    explorer.wait()
+    before = shown_html(explorer)
+    page = explorer._repr_mimebundle_()[SCRUBBER]
+    # Nothing is moved for good, and what stands there first is what the slider says.
+    assert shown_html(explorer) == before
+    control, values = explorer.scrubbed()
+    (data,) = re.findall(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)
+    steps = json.loads(data)
+    assert [float(step["value"]) for step in steps] == [pytest.approx(value) for value in values]
+    for place in (0, len(values) // 2):
+        control.value = values[place]
+        explorer.wait()
+        assert steps[place]["shown"] == shown_html(explorer)
+    assert not network_loads(page)
+    assert len(page) < 5_000_000
+
+
+def test_a_page_that_would_be_too_large_has_fewer_steps() -> None:
+    explorer = match_explorer(LIFTING, LIFTING)
+    one = len(json.dumps(shown_html(explorer)))
+    page = still_html(explorer, explorer.tolerance, range(0, 101, 10), most_bytes=4 * one)
+    assert 1 <= page.count('"value": ') <= 4
+    with pytest.raises(ValueError, match="expected one that is shown within 10 bytes"):
+        still_html(explorer, explorer.tolerance, [0], most_bytes=10)
 
 
 def moves_of(kind: str) -> Callable[[int], None]:

@@ -90,14 +90,14 @@ def test_what_goes_wrong_is_a_sentence_and_the_next_work_is_done() -> None:
 
     watch.latest.ask(wrong, patience_s=30)
     watch.latest.ask(lambda _: 1, patience_s=30)
-    assert watch.failed == ["p: expected 0 to 1, got 2"]
+    assert watch.failed == ["p: expected 0 to 1, got 2."]
     assert watch.shown == [1]
 
 
 def test_an_error_nobody_expected_is_told_too_and_nothing_hangs(caplog: pytest.LogCaptureFixture) -> None:
     watch = Watch()
     watch.latest.ask(lambda _: 1 / 0, patience_s=30)
-    assert watch.failed == ["ZeroDivisionError: division by zero"]
+    assert watch.failed == ["ZeroDivisionError: division by zero."]
     assert "ZeroDivisionError" in caplog.text
     watch.latest.wait(30)
     watch.latest.ask(lambda _: 2, patience_s=30)
@@ -121,6 +121,19 @@ def test_in_a_kernel_the_event_loop_shows_what_came_late() -> None:
 
     asyncio.run(asyncio.wait_for(kernel(), 30))
     assert threads == [threading.main_thread()]
+
+
+def test_who_waits_in_the_kernel_sees_the_result_and_it_is_shown_once() -> None:
+    watch = Watch()
+
+    async def kernel() -> None:
+        watch.latest.ask(lambda _: time.sleep(0.05) or 7, patience_s=0)
+        watch.latest.wait(30)
+        assert watch.shown == [7]
+        await asyncio.sleep(0.05)
+
+    asyncio.run(asyncio.wait_for(kernel(), 30))
+    assert watch.shown == [7]
 
 
 def test_waiting_too_long_is_an_error() -> None:

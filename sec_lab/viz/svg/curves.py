@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from sec_lab.viz.style import CURVE_COLOURS
 from sec_lab.viz.svg.paper import SMALL_PX, Paper, words_px
@@ -60,7 +61,9 @@ def curves_svg(
         raise ValueError(f"frame: expected a row and one to six columns, got shape {frame.shape}")
     xs, ys = frame.index.to_numpy(np.float64), frame.to_numpy(np.float64)
     top = float(np.nanmax(ys)) if y_top is None else y_top
-    top = top if top > 0 else 1.0
+    whole = frame.dtypes.map(lambda kind: kind.kind in "iu").all()
+    ticks = MaxNLocator(4, integer=bool(whole), steps=[1, 2, 2.5, 5, 10]).tick_values(0, top if top > 0 else 1.0)
+    top = float(ticks[-1])
     low, high = float(xs.min()), float(xs.max())
     left, right, above = 44.0, 12.0, 34.0
     below = 40.0
@@ -71,7 +74,7 @@ def curves_svg(
         return above + deep * (1 - min(max(value, 0.0), top) / top)
 
     paper = Paper(width_px, height_px, label=f"{y_label} over {x_label}")
-    for value in np.linspace(0, top, 5):
+    for value in ticks:
         y = down(float(value))
         paper.line(left, y, left + wide, y, opacity="0.18")
         paper.words(left - 6, y, f"{value:g}", size_px=SMALL_PX, soft=True, anchor="end")

@@ -254,7 +254,8 @@ def roles_svg(match: Match, *, pictures: tuple[Mapping[int, str], Mapping[int, s
     deep = (_PICTURE_PX + 8 if shown else 0.0) + 38
     n_rows = max(1, -(-len(pairs) // per_row))
     paper = Paper(min(max(len(pairs), 4), per_row) * cell, 20 + n_rows * deep, label="segments that play the same role")
-    said = f"roles: {len(pairs)} pairs of segments" if pairs else "roles: no segment clearly plays the same one"
+    counted = f"{len(pairs)} pair{'s' if len(pairs) != 1 else ''} of segments"
+    said = f"roles: {counted}" if pairs else "roles: no segment clearly plays the same one"
     paper.words(0, 8, said, size_px=SMALL_PX, soft=True)
     for number, pair in enumerate(pairs):
         x, y = (number % per_row) * cell, 22 + (number // per_row) * deep

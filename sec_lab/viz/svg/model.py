@@ -42,7 +42,7 @@ def model_svg(model: ActionModel, *, row_names: RowNames = "names", title: str =
     paper.words(0, 9, title, bold=True)
     draw_cells(paper, table, x=left, y=_ABOVE_PX, cell_px=(width, height))
     beside = left + k * width + 12
-    paper.words(beside, _ABOVE_PX - 11, "ω^r (share)", size_px=SMALL_PX, soft=True)
+    paper.words(beside, _ABOVE_PX - 11, "ωʳ (share)", size_px=SMALL_PX, soft=True)
     for row, weight in enumerate(model.row_weights.tolist()):
         y = _ABOVE_PX + row * height
         paper.rect(beside, y + 1, _BAR_PX * weight, height - 3, fill=_WEIGHT_COLOUR, data_weight=f"{weight:.2f}")
@@ -55,7 +55,7 @@ def model_svg(model: ActionModel, *, row_names: RowNames = "names", title: str =
         paper.words(
             x + width / 2, deep + 58, f"{weight:.2f}", size_px=SMALL_PX, soft=True, anchor="middle", transform=turn
         )
-    paper.words(left - 8, deep + 14, "ω^c (share)", size_px=SMALL_PX, soft=True, anchor="end")
+    paper.words(left - 8, deep + 14, "ωᶜ (share)", size_px=SMALL_PX, soft=True, anchor="end")
     draw_columns(paper, [""] * k, x=left, y=deep + 58, width=width, title="columns: what happens, in its order")
     draw_legend(paper, [table], x=0, y=deep + 98)
     return paper.markup()

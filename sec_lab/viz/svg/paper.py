@@ -162,6 +162,25 @@ def png(picture: "ArrayLike") -> bytes:
     return buffer.getvalue()
 
 
+def jpeg(picture: "NDArray[np.uint8]") -> bytes:
+    r"""A photograph as a JPEG file: a quarter of the time and of the bytes of PNG.
+
+    Parameters
+    ----------
+    picture : (height, width, 3) uint8
+        RGB.
+
+    Examples
+    --------
+    >>> jpeg(np.zeros((2, 2, 3), np.uint8))[:2]
+    b'\xff\xd8'
+    """
+    import cv2
+
+    _, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 92])
+    return data.tobytes()
+
+
 def draw_cells(
     paper: Paper,
     table: Table,

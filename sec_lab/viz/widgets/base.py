@@ -1,6 +1,6 @@
 """What all explorers have: controls above what they show, a line for what went wrong, and a bar while they work."""
 
-import html
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
@@ -8,14 +8,19 @@ from typing import Any, ParamSpec, TypeVar
 
 import ipywidgets as widgets
 
-from sec_lab.viz.svg.paper import note
 from sec_lab.viz.widgets.latest import TROUBLES, Latest
+from sec_lab.viz.widgets.scrubber import FOR_PAGES, SCRUBBER
+from sec_lab.viz.widgets.sentences import as_alert, sentence_of
+from sec_lab.viz.widgets.still import still_html
 
 T = TypeVar("T")
 Given = ParamSpec("Given")
 
 LABELS = {"description_width": "initial"}
 """Style of controls whose label is as long as it has to be."""
+
+WIDE = {"width": "360px"}
+"""Layout of sliders: room for the label and for the slider."""
 
 
 class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
@@ -37,14 +42,32 @@ class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
         self.work_bar = widgets.HBox([self.progress, self.cancel], layout={"visibility": "hidden"})
         self.add_class("sec-lab-explorer")
 
+    def __repr__(self) -> str:
+        # Not all the drawings that are in it: notebooks store it.
+        return f"{type(self).__name__}()"
+
     def show(self, *rows: widgets.Widget) -> None:
         """Put widgets below each other, the line for troubles first."""
         self.children = (self.trouble, *rows)
 
     def say_trouble(self, text: str) -> None:
         """Show a sentence that says what went wrong, or nothing."""
-        mark = '<span style="border-left:4px solid #e2553f;padding-left:8px" role="alert">'
-        self.trouble.value = note(f"{mark}{html.escape(text)}</span>") if text else ""
+        self.trouble.value = as_alert(text)
+
+    def wait(self) -> None:
+        """Wait until everything that was asked for is shown."""
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]] | None:
+        """The slider that still moves on a page without a kernel, and where it can stand there; None: there is none."""
+        return None
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        """The live widget; while the report is made, also what scrubs in its page."""
+        bundle = super()._repr_mimebundle_(**options)
+        scrubbed = self.scrubbed() if os.environ.get(FOR_PAGES) else None
+        if isinstance(bundle, dict) and scrubbed is not None:
+            bundle[SCRUBBER] = still_html(self, *scrubbed, wait=self.wait)
+        return bundle
 
     @contextmanager
     def guard(self) -> Iterator[None]:
@@ -54,7 +77,7 @@ class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
         try:
             yield
         except TROUBLES as error:
-            self.say_trouble(str(error))
+            self.say_trouble(sentence_of(error))
 
     def on_move(self, controls: Sequence[widgets.Widget], update: Callable[[], object]) -> None:
         """Call a function whenever one of some controls has another value; what goes wrong becomes a sentence."""
@@ -96,7 +119,7 @@ def never_raises(make: Callable[Given, Explorer]) -> Callable[Given, Explorer]:
         except TROUBLES as error:
             explorer = Explorer()
             explorer.show()
-            explorer.say_trouble(str(error))
+            explorer.say_trouble(sentence_of(error))
             return explorer
 
     return made

@@ -23,7 +23,7 @@ function render({ model, el }) {
       host.tabIndex = 0;
       host.dataset.lmSuppressShortcuts = "true";
     }
-    host.title = model.get("tooltip");
+    host.title = model.get("hint");
   }
   function next(name) {
     const before = model.get(name);
@@ -44,7 +44,7 @@ function render({ model, el }) {
     model.set("key", [event.key, next("key")]);
     model.save_changes();
   });
-  const heard = { "change:svg": draw, "change:takes_clicks": fit, "change:tooltip": fit };
+  const heard = { "change:svg": draw, "change:takes_clicks": fit, "change:hint": fit };
   for (const [name, hear] of Object.entries(heard)) model.on(name, hear);
   fit();
   draw();
@@ -57,8 +57,9 @@ export default { render };
 
 _STYLE = """
 .sec-lab-drawing { color: var(--jp-ui-font-color1, inherit); overflow-x: auto; }
+.sec-lab-drawing text { pointer-events: none; }
 .sec-lab-clickable { cursor: pointer; touch-action: manipulation; width: fit-content; max-width: 100%; }
-.sec-lab-clickable:focus { outline: 2px solid var(--jp-brand-color1, #1f5fbf); outline-offset: 2px; }
+.sec-lab-clickable:focus { outline: 2px solid var(--jp-brand-color1, #1f5fbf); outline-offset: -2px; }
 """
 
 
@@ -71,7 +72,7 @@ class Drawing(anywidget.AnyWidget):
         Markup of the drawing, e.g. of :mod:`sec_lab.viz.svg`. Setting it shows another one.
     takes_clicks : bool, optional
         Whether clicks and keys are told; the drawing can then have the focus.
-    tooltip : str, optional
+    hint : str, optional
         Shown when the mouse rests on the drawing.
 
     Attributes
@@ -97,7 +98,7 @@ class Drawing(anywidget.AnyWidget):
 
     svg = traitlets.Unicode("").tag(sync=True)
     takes_clicks = traitlets.Bool(default_value=False).tag(sync=True)
-    tooltip = traitlets.Unicode("").tag(sync=True)
+    hint = traitlets.Unicode("").tag(sync=True)
     clicked: traitlets.List[Any] = traitlets.List().tag(sync=True)
     key: traitlets.List[Any] = traitlets.List().tag(sync=True)
 

@@ -6,6 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
+from sec_lab.viz.widgets.sentences import sentence_of
+
 T = TypeVar("T")
 
 TROUBLES = (TypeError, ValueError, OSError)
@@ -56,6 +58,7 @@ class _Request(Generic[T]):
         self.result: Any = None
         self.error: str | None = None
         self.is_dropped = False
+        self.is_delivered = False
 
 
 class Latest(Generic[T]):
@@ -97,6 +100,7 @@ class Latest(Generic[T]):
         self._lock = threading.Lock()
         self._number = 0
         self._next: _Request[T] | None = None
+        self._late: _Request[T] | None = None
         self._is_running = False
         self._idle = threading.Event()
         self._idle.set()
@@ -138,7 +142,7 @@ class Latest(Generic[T]):
         self._at_rest()
 
     def wait(self, timeout_s: float = 60.0) -> None:
-        """Wait until nothing is left to do.
+        """Wait until nothing is left to do, and what was done is shown.
 
         Raises
         ------
@@ -147,23 +151,29 @@ class Latest(Generic[T]):
         """
         if not self._idle.wait(timeout_s):
             raise TimeoutError(f"widget: expected to be done in {timeout_s} s")
+        if self._late is not None:
+            # Whoever waits in the kernel's own thread keeps its event loop from showing it.
+            self._deliver(self._late)
 
     def _run(self) -> None:
         try:
             while (request := self._take()) is not None:
                 self._do(request)
-        finally:
-            with self._lock:
-                self._is_running = False
-            self._idle.set()
+        except BaseException:
+            self._end()
+            raise
 
     def _take(self) -> _Request[T] | None:
         with self._lock:
             request, self._next = self._next, None
             if request is None:
-                # From here on a new request starts a thread of its own.
-                self._is_running = False
+                # In one step with looking: from here on a new request starts a thread of its own.
+                self._end()
             return request
+
+    def _end(self) -> None:
+        self._is_running = False
+        self._idle.set()
 
     def _do(self, request: _Request[T]) -> None:
         turn = Turn(lambda: request.number != self._number, lambda *of: self._report(request, *of))
@@ -172,16 +182,17 @@ class Latest(Generic[T]):
         except StaleError:
             request.is_dropped = True
         except TROUBLES as error:
-            request.error = str(error)
+            request.error = sentence_of(error)
         except Exception as error:
             # A fault of this program: told in the widget, and where it is in the log.
-            request.error = f"{type(error).__name__}: {error}"
+            request.error = sentence_of(error)
             logging.getLogger(__name__).exception("work of a widget")
         finally:
             with self._lock:
                 request.finished.set()
                 is_late = request.is_late
             if is_late:
+                self._late = request
                 self._hand_over(request, lambda: self._deliver(request))
 
     def _report(self, request: _Request[T], done: int, total: int) -> None:
@@ -195,8 +206,9 @@ class Latest(Generic[T]):
             request.loop.call_soon_threadsafe(call)
 
     def _deliver(self, request: _Request[T]) -> None:
-        if request.number != self._number or request.is_dropped:
+        if request.number != self._number or request.is_dropped or request.is_delivered:
             return
+        request.is_delivered = True
         self._at_rest()
         if request.error is not None:
             self._fail(request.error)

@@ -1,7 +1,7 @@
 """Learning explorer: add and remove demonstrations, move the weight threshold, watch the model (§2.9)."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias, get_args
+from typing import Any, TypeAlias, get_args
 
 import ipywidgets as widgets
 
@@ -11,7 +11,7 @@ from sec_lab.similarity import EFFORT, Normalizer, check_options
 from sec_lab.viz.exploring import Learned, Seen, chain_of, learn_and_compare
 from sec_lab.viz.svg.model import model_svg
 from sec_lab.viz.svg.paper import sentence
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 
 Demonstrations: TypeAlias = Sequence[Seen] | Mapping[str, Seen]
@@ -50,12 +50,12 @@ class LearningExplorer(Explorer):
             name: widgets.Checkbox(value=True, description=name, indent=False, layout={"width": "auto"})
             for name in self._given
         }
-        self._likes = {name: widgets.HTML(layout={"margin": "0 14px 0 2px"}) for name in self._given}
+        self._likes = {name: widgets.Label(layout={"margin": "0 14px 0 2px"}) for name in self._given}
         self.everything = widgets.Button(description="All", tooltip="learn from all demonstrations")
         self.nothing = widgets.Button(description="None", tooltip="learn from none")
         self.weight_threshold = widgets.FloatSlider(
             value=weight_threshold, min=0, max=1, step=0.05, description="weight threshold (share)", style=LABELS,
-            readout_format=".2f",
+            readout_format=".2f", layout=WIDE,
         )  # fmt: skip
         self.mode = widgets.ToggleButtons(
             options=list(get_args(Mode)), description="mode", style={**LABELS, "button_width": "auto"}
@@ -65,7 +65,7 @@ class LearningExplorer(Explorer):
             description="divide by the", style={**LABELS, "button_width": "auto"},
         )  # fmt: skip
         self.tolerance = widgets.IntSlider(
-            value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS
+            value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS, layout=WIDE
         )
         self.said, self.drawing = widgets.HTML(), Drawing()
         ticks = [widgets.HBox([self.ticks[name], self._likes[name]]) for name in self._given]
@@ -88,6 +88,10 @@ class LearningExplorer(Explorer):
     def wait(self) -> None:
         """Wait until the model is shown."""
         self._worker.wait()
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The weight threshold, and where it can stand on a page without a kernel."""
+        return self.weight_threshold, [step / 10 for step in range(11)]
 
     def _tick_all(self, *, value: bool) -> None:
         self._is_ticking = True
@@ -134,7 +138,7 @@ class LearningExplorer(Explorer):
         self.said.value = sentence(said)
         self.drawing.svg = model_svg(model, title=self._title)
         for name, like in self._likes.items():
-            like.value = sentence(f"{learned.similarity[name]:.0f} %")
+            like.value = f"{learned.similarity[name]:.0f} %"
 
 
 @never_raises

@@ -1,6 +1,6 @@
 """Match explorer: two chains side by side, and what the readings of §2.6 make of them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias, get_args
 
 import ipywidgets as widgets
@@ -17,7 +17,7 @@ from sec_lab.viz.svg.match import (
     with_permutation,
 )
 from sec_lab.viz.svg.paper import data_address, sentence
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 
 Pictures: TypeAlias = Mapping[int, ArrayLike]
@@ -47,13 +47,15 @@ class MatchExplorer(Explorer):
             description="divide by the", style={**LABELS, "button_width": "auto"},
         )  # fmt: skip
         self.tolerance = widgets.IntSlider(
-            value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS
+            value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS, layout=WIDE
         )
         self.temporal_input = widgets.ToggleButtons(
             options=[("ξ_o", "original"), ("ξ_d", "derived")], description="columns of",
             style={**LABELS, "button_width": "auto"},
         )  # fmt: skip
-        self.permutation = widgets.IntSlider(value=1, min=1, max=1, description="permutation (no.)", style=LABELS)
+        self.permutation = widgets.IntSlider(
+            value=1, min=1, max=1, description="permutation (no.)", style=LABELS, layout=WIDE
+        )
         self.names = widgets.ToggleButtons(
             options=[("ρ", "relations"), ("names", "names")], description="rows as",
             style={**LABELS, "button_width": "auto"},
@@ -81,6 +83,10 @@ class MatchExplorer(Explorer):
     def match(self) -> Match:
         """The match, with the permutation that is shown."""
         return self._shown
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The tolerance, and where it can stand on a page without a kernel."""
+        return self.tolerance, range(0, 101, 10)
 
     def _compare_pair(self) -> None:
         normalizer: Normalizer = self.normalizer.value

@@ -1,7 +1,7 @@
 """Noise explorer: what a noise level does to a chain, and what is left of similarity and roles (§3.1)."""
 
-from collections.abc import Mapping
-from typing import get_args
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
 
 import ipywidgets as widgets
 import numpy as np
@@ -14,7 +14,7 @@ from sec_lab.viz.exploring import NoiseCurves, chain_of, noise_curves, noise_exa
 from sec_lab.viz.svg.curves import curves_svg
 from sec_lab.viz.svg.model import sample_svg
 from sec_lab.viz.svg.paper import sentence
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 
 N_SAMPLES = (10, 30, 100, 300, 1000)
@@ -50,8 +50,8 @@ class NoiseExplorer(Explorer):
             raise ValueError("seeds: expected at least one, got none")
         counts = sorted({*N_SAMPLES, n_samples})
         self.p = widgets.FloatSlider(
-            value=p, min=0, max=1, step=0.01, description="noise level p (probability)", style=LABELS,
-            readout_format=".2f", layout={"width": "420px"},
+            value=p, min=0, max=1, step=0.05, description="noise level p (probability)", style=LABELS,
+            readout_format=".2f", layout=WIDE,
         )  # fmt: skip
         self.mode = widgets.ToggleButtons(
             options=list(get_args(Mode)), value=mode, description="mode", style={**LABELS, "button_width": "auto"}
@@ -63,7 +63,9 @@ class NoiseExplorer(Explorer):
         self.random_seed = widgets.BoundedIntText(
             value=random_seed, min=0, max=10**6, description="random seed (number)", style=LABELS, layout=_NARROW
         )
-        self.example = widgets.IntSlider(value=1, min=1, max=n_samples, description="sample (no.)", style=LABELS)
+        self.example = widgets.IntSlider(
+            value=1, min=1, max=n_samples, description="sample (no.)", style=LABELS, layout=WIDE
+        )
         self.said, self.curves, self.sample = widgets.HTML(), Drawing(), Drawing()
         self._found: NoiseCurves | None = None
         self._is_moving = False
@@ -79,6 +81,10 @@ class NoiseExplorer(Explorer):
     def wait(self) -> None:
         """Wait until the curves are shown."""
         self._worker.wait()
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The noise level, and where it can stand on a page without a kernel."""
+        return self.p, [step / 10 for step in range(11)]
 
     @property
     def samples(self) -> NoisySamples:

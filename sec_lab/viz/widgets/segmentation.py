@@ -12,17 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from sec_lab.recording import Recording
 from sec_lab.segmentation import Segmentation
 from sec_lab.segmentation.potts import DEFAULT, ColourSpace, PottsParameters
-from sec_lab.viz.exploring import SegmentedFrame, beside_each_other, segmented_frame
+from sec_lab.segmentation.quality import covering
+from sec_lab.viz.exploring import FollowedMovie, SegmentedFrame, beside_each_other, followed_movie, segmented_frame
 from sec_lab.viz.frame_shelf import FrameShelf
-from sec_lab.viz.svg.paper import png, sentence
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.svg.paper import jpeg, sentence
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.latest import Turn
 from sec_lab.viz.widgets.picture import ClickablePicture
 
 Movie: TypeAlias = Recording | str | os.PathLike[str] | ArrayLike
 Truth: TypeAlias = Segmentation | ArrayLike
-
-_WIDE = {"width": "340px"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +43,11 @@ class SegmentationExplorer(Explorer):
     ----------
     frame, alpha, anneal_sweeps, smooth_sweeps, blur_sigma_px, minimum_size_px, minimum_thickness_px, colour_space
         The controls, ipywidgets.
-    said, pointed : ipywidgets.HTML
-        Number of segments and covering, and the segment that was clicked, in a sentence.
+    follow : ipywidgets.Button
+        Follows segments through the movie, with these parameters.
+    said, movie_said, pointed : ipywidgets.HTML
+        Number of segments and covering of the frame, the same of the movie once it was followed, and the segment that
+        was clicked, in a sentence.
     picture : ClickablePicture
         The frame; beside it the segments, and the true ones where they are known.
     """
@@ -55,21 +57,22 @@ class SegmentationExplorer(Explorer):
         movie = _as_recording(recording)
         n_frames = _count(movie)
         self._frames = FrameShelf(movie)
-        self._truth = None if truth is None else FrameShelf(_as_labels(truth))
+        self._movie, self._true = movie, None if truth is None else _as_labels(truth)
+        self._truth = None if self._true is None else FrameShelf(self._true)
         self._kept = parameters
         self.frame = widgets.IntSlider(
             min=0, max=n_frames - 1, description=f"frame (no. of {n_frames})", style=LABELS, disabled=n_frames == 1,
-            layout=_WIDE,
+            layout=WIDE,
         )  # fmt: skip
         self.alpha = widgets.FloatSlider(
             value=parameters.alpha, min=0.1, max=10, step=0.1, description="α (of the mean colour difference)",
-            style=LABELS, layout=_WIDE, readout_format=".1f",
+            style=LABELS, layout=WIDE, readout_format=".1f",
         )  # fmt: skip
         self.anneal_sweeps = _whole("sweeps of annealing (number)", parameters.anneal_sweeps, 1, 60)
         self.smooth_sweeps = _whole("sweeps of smoothing (number)", parameters.smooth_sweeps, 0, 12)
         self.blur_sigma_px = widgets.FloatSlider(
             value=parameters.blur_sigma_px, min=0, max=3, step=0.1, description="blur σ (px)", style=LABELS,
-            layout=_WIDE, readout_format=".1f",
+            layout=WIDE, readout_format=".1f",
         )  # fmt: skip
         self.minimum_size_px = _whole("minimum size (px)", parameters.minimum_size_px, 1, 1000)
         self.minimum_thickness_px = _whole("minimum thickness (px)", parameters.minimum_thickness_px, 0, 12)
@@ -77,7 +80,11 @@ class SegmentationExplorer(Explorer):
             options=list(get_args(ColourSpace)), value=parameters.colour_space, description="colours in",
             style={**LABELS, "button_width": "auto"},
         )  # fmt: skip
-        self.said, self.pointed = widgets.HTML(), widgets.HTML()
+        self.follow = widgets.Button(
+            description="Follow through the movie", disabled=n_frames == 1, layout={"width": "auto"},
+            tooltip="segments keep their labels from frame to frame; until a parameter changes, frames show these",
+        )  # fmt: skip
+        self.said, self.movie_said, self.pointed = widgets.HTML(), widgets.HTML(), widgets.HTML()
         self.picture = ClickablePicture(
             description="a frame, and its segments beside it", tooltip="click a segment to see how large it is"
         )
@@ -85,11 +92,18 @@ class SegmentationExplorer(Explorer):
             self.alpha, self.anneal_sweeps, self.smooth_sweeps, self.blur_sigma_px, self.minimum_size_px,
             self.minimum_thickness_px, self.colour_space,
         ]  # fmt: skip
-        self.show(row_of(self.frame), row_of(*controls), self.work_bar, self.said, self.picture, self.pointed)
+        self.show(
+            row_of(self.frame, self.follow), row_of(*controls), self.work_bar, self.said, self.movie_said, self.picture,
+            self.pointed,
+        )  # fmt: skip
         self._shown: _Shown | None = None
+        self._followed: FollowedMovie | None = None
         self._worker = self.latest(self._show)
+        self._follower = self.latest(self._show_followed)
         self.picture.on_click(self._click)
-        self.on_move([self.frame, *controls], self._segment)
+        self.follow.on_click(lambda _: self._follow())
+        self.on_move([self.frame], self._segment)
+        self.on_move(controls, self._segment_anew)
         with self.guard():
             self._segment()
 
@@ -111,24 +125,59 @@ class SegmentationExplorer(Explorer):
 
     def wait(self) -> None:
         """Wait until the segments are shown."""
+        self._follower.wait()
         self._worker.wait()
 
-    def _segment(self) -> None:
-        place, parameters = self.frame.value, self.parameters
-        self._worker.ask(lambda turn: self._work(place, parameters, turn))
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The α, and where it can stand on a page without a kernel."""
+        return self.alpha, [float(step) for step in range(1, 11)]
 
-    def _work(self, place: int, parameters: PottsParameters, turn: Turn) -> _Shown:
+    def _segment(self) -> None:
+        place, parameters, followed = self.frame.value, self.parameters, self._followed
+        self._worker.ask(lambda turn: self._work(place, parameters, followed, turn))
+
+    def _segment_anew(self) -> None:
+        # What was followed was followed with other parameters.
+        self._followed, self.movie_said.value = None, ""
+        self._follower.cancel()
+        self._segment()
+
+    def _follow(self) -> None:
+        with self.guard():
+            parameters = self.parameters
+            self._follower.ask(
+                lambda turn: followed_movie(
+                    self._movie, parameters=parameters, truth=self._true, report=turn.report
+                )
+            )  # fmt: skip
+
+    def _show_followed(self, followed: FollowedMovie) -> None:
+        self._followed = followed
+        said = f"followed through {len(followed.labels)} frames: {followed.n_labels} labels"
+        if followed.quality is not None:
+            judged = followed.quality
+            said += f", covering {judged.covering:.3f}, labels kept {judged.kept:.3f} (1 is best)"
+        self.movie_said.value = sentence(f"{said}.")
+        self._segment()
+
+    def _work(
+        self, place: int, parameters: PottsParameters, followed: FollowedMovie | None, turn: Turn
+    ) -> _Shown:  # fmt: skip
         frame = self._frames.at(place, report=turn.report)
         truth = None if self._truth is None else np.asarray(self._truth.at(place, report=turn.report))
-        found = segmented_frame(frame.image, parameters=parameters, depth_m=frame.depth_m, truth=truth)
+        if followed is not None and place < len(followed.labels):
+            labels_here = followed.labels[place]
+            found = SegmentedFrame(labels_here, None if truth is None else covering(labels_here, truth))
+        else:
+            found = segmented_frame(frame.image, parameters=parameters, depth_m=frame.depth_m, truth=truth)
         labels = [found.labels] if truth is None else [found.labels, truth]
         picture = beside_each_other(frame.image, *labels)
         step = -(-frame.image.shape[0] // picture.shape[0])
-        return _Shown(place, frame.index, found, truth, png(picture), step)
+        return _Shown(place, frame.index, found, truth, jpeg(picture), step)
 
     def _show(self, shown: _Shown) -> None:
         self._shown = shown
-        n_segments = int(shown.found.labels.max())
+        n_segments = len(np.unique(shown.found.labels))
         said = f"frame {shown.number}: {n_segments} segment{'s' if n_segments != 1 else ''}"
         if shown.found.covering is not None and shown.truth is not None:
             said += f"; {len(np.unique(shown.truth))} true ones are covered by {shown.found.covering:.3f} (1 is best)"
@@ -158,7 +207,7 @@ def segmentation_explorer(
 ) -> Explorer:
     """Turn the knobs of superparamagnetic clustering on any frame of a movie (§2.2).
 
-    Every frame is segmented by itself.
+    Every frame is segmented by itself, unless segments are followed through the movie, at the press of a button.
 
     Parameters
     ----------
@@ -188,7 +237,7 @@ def segmentation_explorer(
 
 def _whole(description: str, value: int, low: int, high: int) -> widgets.IntSlider:
     return widgets.IntSlider(
-        value=value, min=low, max=max(high, value), description=description, style=LABELS, layout=_WIDE
+        value=value, min=low, max=max(high, value), description=description, style=LABELS, layout=WIDE
     )
 
 

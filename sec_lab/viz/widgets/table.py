@@ -1,7 +1,7 @@
 """Table explorer: point at a pair in a table of similarities, and see what a threshold decides (§2.7)."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import ipywidgets as widgets
 import numpy as np
@@ -12,9 +12,10 @@ from sec_lab.viz.exploring import Seen, chain_of
 from sec_lab.viz.svg.curves import curves_svg
 from sec_lab.viz.svg.paper import sentence
 from sec_lab.viz.svg.table import cell_at, moved, table_layout, table_svg, table_words
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 from sec_lab.viz.widgets.match import MatchExplorer, Pictures
+from sec_lab.viz.widgets.still import LIVE_ONLY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,13 +68,15 @@ class TableExplorer(Explorer):
             self._errors.columns = [str(name).replace("_", " ") for name in self._errors.columns]
         self.threshold = widgets.IntSlider(
             value=round(threshold_percent), min=0, max=100, description="threshold of similarity (%)", style=LABELS,
-            layout={"width": "420px"},
+            layout=WIDE,
         )  # fmt: skip
         self.said, self.chosen = widgets.HTML(), widgets.HTML()
         hint = "click a cell, or move with the arrow keys, to open the pair"
-        self.table, self.errors = Drawing(takes_clicks=True, tooltip=hint), Drawing()
+        self.table, self.errors = Drawing(takes_clicks=True, hint=hint), Drawing()
         self.pair = widgets.VBox()
         self.show(self.threshold, self.said, row_of(self.table, self.errors), self.chosen, self.pair)
+        # A page without a kernel opens nothing.
+        self.chosen.add_class(LIVE_ONLY)
         self.chosen.value = sentence(f"No pair is open: {hint}.")
         self._draw()
         self.on_move([self.threshold], self._draw)
@@ -92,6 +95,10 @@ class TableExplorer(Explorer):
             if name not in self._layout.names:
                 raise ValueError(f"pair: expected two rows of the table, got {name!r}")
         self._open((self._layout.names.index(row), self._layout.names.index(column)))
+
+    def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
+        """The threshold, and where it can stand on a page without a kernel."""
+        return self.threshold, range(0, 101, 4)
 
     def _click(self, x: float, y: float) -> None:
         cell = cell_at(self._layout, x, y)
