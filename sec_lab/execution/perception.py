@@ -152,7 +152,7 @@ class Watcher:
             If the frame has no range.
         """
         self._fingers = None if tip_m is None else _fingers(tip_m)
-        found = named_things(frame, self.camera, self.colours, self._rays, lambda name: name not in self._solids)
+        found = named_things(frame, self.camera, self.colours, self._rays, self._is_new)
         seen = {thing.name: self._followed(thing) for thing in found}
         for name, thing in self._last.items():
             if name not in seen and self._is_hidden(thing):
@@ -221,6 +221,9 @@ class Watcher:
     def _drift(self, name: str) -> float:
         places = [centres[name] for centres in self._centres[-_RESTING_FRAMES:] if name in centres]
         return float(np.linalg.norm(places[-1] - places[0])) if places else 0.0
+
+    def _is_new(self, name: str) -> bool:
+        return name != ARM and name not in self._solids
 
     def _followed(self, thing: SeenThing) -> SeenThing:
         """With its solid where it is now; a thing that was never seen before brings its own."""
