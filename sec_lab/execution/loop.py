@@ -8,7 +8,7 @@ import numpy as np
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.execution.motion import Run, UnreachableError
-from sec_lab.execution.perception import TABLE, Perceived, Watcher, things_in
+from sec_lab.execution.perception import TABLE, Perceived, Watcher
 from sec_lab.execution.planning import Skill, Step, plan, shifted, told, way_home
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
@@ -117,12 +117,11 @@ def execute_skill(
         At the first look, before anything moves: nothing can be done, or not by this arm.
     """
     run = Run(scene, fault=fault, watched=True)
-    steps = _planned(run, scene, skill, again=False)
+    watcher = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND)
+    steps = _planned(run, watcher, scene, skill, again=False)
     verdicts: list[Verdict] = []
     attempt, gave_up = 0, ""
     while True:
-        watcher = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND)
-        watcher.add(run.view(), tip_m=run.tip_m)
         seen = _seen_from(run, watcher, run.n_frames)
         agrees, pressed = True, None
         for step in steps:
@@ -143,11 +142,14 @@ def execute_skill(
         if attempt >= most_attempts:
             gave_up = f"{attempt} attempts failed"
             break
+        # What has been seen whole stays known, though it may be half hidden now.
+        renewed = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND, known=watcher.known)
         try:
-            steps = _planned(run, scene, skill, again=True)
+            steps = _planned(run, renewed, scene, skill, again=True)
         except ValueError as error:
             gave_up = str(error)
             break
+        watcher = renewed
     return Outcome(
         agrees,
         tuple(verdicts),
@@ -212,9 +214,10 @@ def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None)
     return f"{pair}: expected a gap of at most {1000 * most:.1f} mm, got {1000 * gap:.1f} mm"
 
 
-def _planned(run: Run, scene: Scene, skill: Skill, *, again: bool) -> tuple[Step, ...]:
+def _planned(run: Run, watcher: Watcher, scene: Scene, skill: Skill, *, again: bool) -> tuple[Step, ...]:
     """A plan for what is seen now, all of it within the arm's reach from where it is."""
-    steps = plan(skill, things_in(run.view(), scene.camera), home_m=scene.home_m, again=again)
+    things = watcher.add(run.view(), tip_m=run.tip_m)
+    steps = plan(skill, things, home_m=scene.home_m, again=again)
     run.check(*(move for step in steps for move in step.moves))
     return steps
 

@@ -3,7 +3,7 @@
 Nothing here knows what the simulator knows: pictures, range pictures and where the camera stands are all there is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
@@ -63,6 +63,7 @@ STEADY_S = 0.2
 """For how long a change must last to count; it is dated to the frame in which it began."""
 
 _RESTING_FRAMES = 5
+_FITS_M = 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +113,18 @@ class Watcher:
     camera : Camera
     frames_per_second : float
     colours : sequence of NamedColour, optional
+    known : mapping of str to Solid, optional
+        Shapes of things that were seen whole before; others are known from where they are seen first.
     """
 
-    def __init__(self, camera: Camera, *, frames_per_second: float, colours: Sequence[NamedColour] = COLOURS) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        frames_per_second: float,
+        colours: Sequence[NamedColour] = COLOURS,
+        known: Mapping[str, Solid] | None = None,
+    ) -> None:
         self.camera = camera
         self.colours = tuple(colours)
         self.frames_per_second = frames_per_second
@@ -123,7 +133,7 @@ class Watcher:
         self._pairs = list(combinations([colour.name for colour in self.colours], 2))
         self._gaps: list[list[float]] = []
         self._centres: list[dict[str, Floats]] = []
-        self._solids: dict[str, Solid] = {}
+        self._solids: dict[str, Solid] = dict(known or {})
         self._last: dict[str, SeenThing] = {}
         self._most_px: dict[str, int] = {}
         self._fingers: Floats | None = None
@@ -222,6 +232,11 @@ class Watcher:
         places = [centres[name] for centres in self._centres[-_RESTING_FRAMES:] if name in centres]
         return float(np.linalg.norm(places[-1] - places[0])) if places else 0.0
 
+    @property
+    def known(self) -> dict[str, Solid]:
+        """Shapes that still fit what was seen of them last."""
+        return {name: solid for name, solid in self._solids.items() if solid.error_m <= _FITS_M}
+
     def _is_new(self, name: str) -> bool:
         return name != ARM and name not in self._solids
 
@@ -236,7 +251,8 @@ class Watcher:
             # What has not changed in the picture has not moved.
             if last is None or not np.array_equal(last.points_m, thing.points_m):
                 solid = follow(solid, thing.points_m)
-            thing = replace(thing, solid=solid, centre_m=np.array([*solid.centre_m, thing.top_m / 2]))
+            centre = np.array([*solid.centre_m, thing.top_m / 2])
+            thing = replace(thing, solid=solid, centre_m=centre, footprint_m=solid.section_m())
         assert thing.solid is not None
         self._solids[thing.name] = thing.solid
         return thing

@@ -335,7 +335,8 @@ def check_scene(skill: Skill, things: Sequence[SeenThing], *, again: bool = Fals
         if seen[name].n_parts > 1:
             raise SceneError(f"scene: expected one candidate for {name!r}, got {seen[name].n_parts}")
         top, bottom = seen[name].top_m, seen[name].bottom_m
-        if not 0.01 < top < 0.2 or not -0.01 < bottom < _LEAST_SEEN * top:
+        # Of what stands behind another after a failure, little may be seen.
+        if not 0.01 < top < 0.2 or bottom < -0.01 or (bottom > _LEAST_SEEN * top and not again):
             raise SceneError(f"scene: expected {name!r} on the table, got it from {bottom:.3f} to {top:.3f} m above it")
     first, second = seen[skill.first], seen[skill.second]
     if first.solid is None or second.solid is None:
