@@ -140,6 +140,23 @@ def test_what_is_hidden_is_not_absent(rows: tuple[int, ...], top: int, present: 
     assert ("robot arm" in {one.name for one in seen}) == present
 
 
+def test_what_was_seen_whole_is_known_where_it_is_half_hidden() -> None:
+    """After a failure the second object may stand behind the first."""
+    scene = example_scene("a")
+    red, green = scene.things
+    green = replace(green, p_W_m=(0.28, 0.0, 0.03), yaw_rad=0.2)
+    apart = replace(scene, things=(replace(red, p_W_m=(0.30, -0.14, 0.03)), green))
+    before = replace(scene, things=(replace(red, p_W_m=(0.35, 0.01, 0.03)), green))
+    first = Watcher(scene.camera, frames_per_second=20.0)
+    first.add(view(apart))
+    again = Watcher(scene.camera, frames_per_second=20.0, known=first.known)
+    seen = {one.name: one for one in again.add(view(before))}
+    assert seen["green box"].bottom_m > 0.02
+    np.testing.assert_allclose(seen["green box"].centre_m[:2], green.p_W_m[:2], atol=5e-4)
+    np.testing.assert_allclose(np.ptp(seen["green box"].solid.corners_m, axis=0), 0.06, atol=8e-4)
+    assert set(first.known) == {"red box", "green box"}
+
+
 def test_watcher_needs_range_and_frames() -> None:
     watcher = Watcher(camera_at(), frames_per_second=20.0)
     with pytest.raises(ValueError, match="at least one frame"):
