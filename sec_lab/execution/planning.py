@@ -18,6 +18,7 @@ from sec_lab.execution.anchors import (
     start_points,
     touching_points,
 )
+from sec_lab.execution.enriched import Enriched
 from sec_lab.execution.perception import Perceived, SeenThing, things_in
 from sec_lab.learning import learn
 from sec_lab.recording import Recording
@@ -111,6 +112,24 @@ class Demonstrated:
     perceived: Perceived
     tip_m: Floats
 
+    @property
+    def frames_per_second(self) -> float:
+        """Of the recording."""
+        return self.recording.frames_per_second or 20.0
+
+    def things_at(self, number: int) -> tuple[SeenThing, ...]:
+        """Things as they are seen in a frame.
+
+        Raises
+        ------
+        ValueError
+            If there is no such frame.
+        """
+        for frame in self.recording:
+            if frame.index == number:
+                return things_in(frame, self.camera)
+        raise ValueError(f"frame: expected one of the movie, got {number}")
+
 
 @dataclass(frozen=True)
 class Step:
@@ -150,12 +169,13 @@ def rules_of(model: ActionModel) -> tuple[Rule, ...]:
     return tuple(rules)
 
 
-def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
+def learn_skill(demonstrations: Mapping[str, Demonstrated | Enriched]) -> Skill:
     """Learn the model (step 7) and read the anchor points off the key frames of all demonstrations (§2.10.3).
 
     Parameters
     ----------
-    demonstrations : mapping of str to Demonstrated
+    demonstrations : mapping of str to Demonstrated or Enriched
+        Enriched ones come from files (A.2).
 
     Returns
     -------
@@ -302,16 +322,12 @@ def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, S
 
 
 def _measured(
-    one: Demonstrated, frames: Sequence[int], leaving: int, first: str, second: str
+    one: Demonstrated | Enriched, frames: Sequence[int], leaving: int, first: str, second: str
 ) -> tuple[Floats, Floats, Floats, Floats, float, float, Floats, float]:
     """What one demonstration says: where the tip was, and how far from the borders."""
     appears, touches, _ = frames
-    before = {}
-    for frame in one.recording:
-        # The objects are measured where nothing hides them yet: just before the arm is first seen.
-        if frame.index == max(appears - 1, 0):
-            before = {thing.name: thing for thing in things_in(frame, one.camera)}
-            break
+    # The objects are measured where nothing hides them yet: just before the arm is first seen.
+    before = {thing.name: thing for thing in one.things_at(max(appears - 1, 0))}
     red, green = before[first], before[second]
     vector = connection_vector(red, green)
     tip = one.tip_m[touches]
@@ -324,8 +340,7 @@ def _measured(
     press = farthest - in_frame([*found.E1_m, 0.0], red.centre_m, vector)[0] - segment_length(found)
     moving = one.tip_m[touches:leaving]
     steps = np.linalg.norm(np.diff(moving, axis=0), axis=1)
-    fps = one.recording.frames_per_second or 20.0
-    speed = float(steps[steps > 1e-4].mean() * fps)
+    speed = float(steps[steps > 1e-4].mean() * one.frames_per_second)
     return one.tip_m[appears], tip, red.centre_m, vector, standoff, float(press), one.tip_m[-1], speed
 
 

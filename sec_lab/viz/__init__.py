@@ -4,6 +4,9 @@ Functions draw into axes that are given, or make a figure of their own, without 
 a notebook. One style (:mod:`sec_lab.viz.style`) serves all of them.
 """
 
+from sec_lab.viz.arm import ArmRecording as ArmRecording
+from sec_lab.viz.arm import LiveArm as LiveArm
+from sec_lab.viz.arm import arm_recording as arm_recording
 from sec_lab.viz.by_model import draw_by_model as draw_by_model
 from sec_lab.viz.by_model import draw_over_time as draw_over_time
 from sec_lab.viz.cells import relation_name as relation_name
