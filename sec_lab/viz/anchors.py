@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,11 +11,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
-from sec_lab.execution.anchors import Intersections, PrimeMover
-from sec_lab.execution.recorded_anchors import NAMES, RecordedAnchors
 from sec_lab.viz.scene import draw_segments
 from sec_lab.viz.style import INK, PAGE_WIDTH_IN, PAPER, SMALL_PT, SOFT, TEXT_PT, axes_at, bare, new_figure, tidy
 from sec_lab.worlds.katana import Camera, Move, project
+
+if TYPE_CHECKING:
+    from sec_lab.execution.anchors import Intersections, PrimeMover
+    from sec_lab.execution.recorded_anchors import RecordedAnchors
 
 POINT_COLOUR: Mapping[str, str] = {
     "S1": "#d62718",
@@ -25,6 +27,8 @@ POINT_COLOUR: Mapping[str, str] = {
     "E3": "#22262c",
 }
 """As in Fig. 2.18."""
+
+NAMES = tuple(POINT_COLOUR)
 
 _TOLD = {
     "S1": "S₁ where the arm is first seen (D2)",
@@ -42,7 +46,7 @@ _HALO = [withStroke(linewidth=2.2, foreground=PAPER)]
 
 
 def draw_prime_mover(
-    before: ArrayLike, after: ArrayLike, found: PrimeMover, *, key_frames: tuple[int, int] | None = None
+    before: ArrayLike, after: ArrayLike, found: "PrimeMover", *, key_frames: tuple[int, int] | None = None
 ) -> Figure:
     """Draw the subtraction that finds the prime mover (D1): segments at two key frames, and where they differ.
 
@@ -65,6 +69,7 @@ def draw_prime_mover(
 
     Examples
     --------
+    >>> from sec_lab.execution.anchors import PrimeMover
     >>> figure = draw_prime_mover([[1, 1]], [[1, 2]], PrimeMover("robot arm", {"robot arm": 1}))
     >>> figure.axes[2].get_title(loc="left")
     'difference: robot arm 1 px'
@@ -86,7 +91,7 @@ def draw_prime_mover(
 
 
 def draw_anchor_spread(
-    image: ArrayLike, camera: Camera, anchors: Mapping[str, RecordedAnchors], *, shown: str
+    image: ArrayLike, camera: Camera, anchors: "Mapping[str, RecordedAnchors]", *, shown: str
 ) -> Figure:
     """Draw start and end points of all demonstrations over the start of one of them (Fig. 2.18), and seen from above.
 
@@ -156,7 +161,7 @@ def draw_anchor_spread(
 
 
 def draw_demonstrated(
-    image: ArrayLike, camera: Camera, recorded: RecordedAnchors, *, ax: Axes | None = None, title: str | None = None
+    image: ArrayLike, camera: Camera, recorded: "RecordedAnchors", *, ax: Axes | None = None, title: str | None = None
 ) -> Axes:
     """Draw the start and end points of one demonstration over its start (Fig. 2.19 A).
 
@@ -182,7 +187,7 @@ def draw_demonstrated(
 def draw_planned(
     image: ArrayLike,
     camera: Camera,
-    found: Intersections,
+    found: "Intersections",
     moves: Sequence[Move],
     *,
     origin_m: ArrayLike,

@@ -1,13 +1,13 @@
 """What the arm's camera saw: pictures, range, segments and main graphs (Fig. 2.13, 2.14), and strips (Fig. 2.20)."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sec_lab.execution.loop import Outcome
-from sec_lab.execution.perception import COLOURS, MINIMUM_PX, Perceived
+from sec_lab.execution.perception import COLOURS, MINIMUM_PX
 from sec_lab.observation import Observation
 from sec_lab.recording import Frame, Recording
 from sec_lab.scene_graph import SceneGraph
@@ -15,8 +15,12 @@ from sec_lab.segmentation.colour import colour_segments
 from sec_lab.viz.gallery import Panel, draw_gallery, graph_at
 from sec_lab.worlds.katana import Camera, project
 
+if TYPE_CHECKING:
+    from sec_lab.execution.loop import Outcome
+    from sec_lab.execution.perception import Perceived
 
-def draw_seen(perceived: Perceived, recording: Recording, camera: Camera, frames: Sequence[int]) -> Figure:
+
+def draw_seen(perceived: "Perceived", recording: Recording, camera: Camera, frames: Sequence[int]) -> Figure:
     """Draw moments of a movie as Fig. 2.13 and 2.14 do: pictures, range, segments with the scene graph.
 
     Parameters
@@ -52,7 +56,7 @@ def draw_seen(perceived: Perceived, recording: Recording, camera: Camera, frames
     return draw_gallery(rows, columns=columns, names=["picture", "range", "segments"], measure="range in m")
 
 
-def draw_strips(outcomes: Mapping[str, Outcome]) -> Figure:
+def draw_strips(outcomes: "Mapping[str, Outcome]") -> Figure:
     """Draw executions as strips (Fig. 2.20): the camera's picture at every key frame of the last attempt.
 
     Parameters
@@ -77,7 +81,7 @@ def draw_strips(outcomes: Mapping[str, Outcome]) -> Figure:
     return draw_gallery(list(rows.values()), columns=columns, names=list(rows))
 
 
-def key_frames_of(outcome: Outcome) -> list[int]:
+def key_frames_of(outcome: "Outcome") -> list[int]:
     """Key frames of the last attempt's chain, counted in the recording of everything.
 
     Parameters
