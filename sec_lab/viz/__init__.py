@@ -44,4 +44,4 @@ from sec_lab.viz.watched import colour_labels as colour_labels
 from sec_lab.viz.watched import draw_seen as draw_seen
 from sec_lab.viz.watched import draw_strips as draw_strips
 from sec_lab.viz.watched import frames_at as frames_at
-from sec_lab.viz.watched import key_frames_of as key_frames_of
+from sec_lab.viz.watched import start_of_last_attempt as start_of_last_attempt

@@ -57,12 +57,12 @@ def draw_seen(perceived: "Perceived", recording: Recording, camera: Camera, fram
 
 
 def draw_strips(outcomes: "Mapping[str, Outcome]") -> Figure:
-    """Draw executions as strips (Fig. 2.20): the camera's picture at every key frame of the last attempt.
+    """Draw executions as strips (Fig. 2.20): what the camera sees at the start, and after each rule of the last attempt.
 
     Parameters
     ----------
     outcomes : mapping of str to Outcome
-        By the name of the scene; all with as many key frames.
+        By the name of the scene; in the last attempt of each as many rules were followed.
 
     Returns
     -------
@@ -71,32 +71,28 @@ def draw_strips(outcomes: "Mapping[str, Outcome]") -> Figure:
     Raises
     ------
     ValueError
-        If there is no outcome, or they differ in how many key frames their chains have.
+        If there is no outcome, or they differ in how many rules were followed.
     """
-    rows = {}
-    for name, outcome in outcomes.items():
-        moments = frames_at(outcome.recording, key_frames_of(outcome))
-        rows[name] = [Panel(frame.image) for frame in moments]
-    columns = [f"key frame {number}" for number in range(1, 1 + max(map(len, rows.values()), default=0))]
-    return draw_gallery(list(rows.values()), columns=columns, names=list(rows))
+    rows, columns = [], ["start"]
+    for outcome in outcomes.values():
+        verdicts = [one for one in outcome.verdicts if one.attempt == outcome.verdicts[-1].attempt]
+        # The look after a rule is the last of that many frames, counted from the first of the attempt.
+        looks = [start_of_last_attempt(outcome) + one.frame - 1 for one in verdicts]
+        moments = frames_at(outcome.recording, [0, *looks])
+        rows.append([Panel(frame.image) for frame in moments])
+        columns = ["start", *(f"after {one.rule[-3:]}" for one in verdicts)]
+    return draw_gallery(rows, columns=columns, names=list(outcomes))
 
 
-def key_frames_of(outcome: "Outcome") -> list[int]:
-    """Key frames of the last attempt's chain, counted in the recording of everything.
+def start_of_last_attempt(outcome: "Outcome") -> int:
+    """Number of the frame, in the recording of everything, at which the last attempt's chain begins.
 
     Parameters
     ----------
     outcome : Outcome
-
-    Raises
-    ------
-    ValueError
-        If the last attempt has no chain: nothing touched or parted.
     """
-    if outcome.chain is None:
-        raise ValueError("outcome: expected a chain of the last attempt, got none")
     n_watched = len(next(iter(outcome.perceived.gaps_m.values())))
-    return [int(frame) + len(outcome.recording) - n_watched for frame in outcome.chain.key_frames]
+    return len(outcome.recording) - n_watched
 
 
 def frames_at(recording: Recording, numbers: Sequence[int]) -> list[Frame]:
