@@ -57,7 +57,7 @@ def draw_seen(perceived: "Perceived", recording: Recording, camera: Camera, fram
 
 
 def draw_strips(outcomes: "Mapping[str, Outcome]") -> Figure:
-    """Draw executions as strips (Fig. 2.20): what the camera sees at the start, and after each rule of the last attempt.
+    """Draw executions as strips (Fig. 2.20): the camera at the start, and after each rule of the last attempt.
 
     Parameters
     ----------
