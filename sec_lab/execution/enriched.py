@@ -266,7 +266,9 @@ def _enriched(observation: Observation, data: bytes) -> Enriched:
             pair = names[edge.attrib["source"]], names[edge.attrib["target"]]
             gaps[pair] = _numbers(gap, 1, what=f"gap_m of {pair}")[0] if gap else np.array([np.inf])
     moved = _moved(list(things.values()))
-    return Enriched(Perceived(observation, decisive_rows(observation), gaps, moved), np.concatenate(path), fps, things)
+    # In the end everything rests.
+    perceived = Perceived(observation, decisive_rows(observation), gaps, moved, dict.fromkeys(moved, 0.0))
+    return Enriched(perceived, np.concatenate(path), fps, things)
 
 
 def _thing(node: "Element") -> SeenThing:

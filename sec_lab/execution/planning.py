@@ -18,8 +18,10 @@ from sec_lab.execution.anchors import (
     start_points,
     touching_points,
 )
+from sec_lab.execution.corridor import obstacle, swept
 from sec_lab.execution.enriched import Enriched
-from sec_lab.execution.perception import Perceived, SeenThing, things_in
+from sec_lab.execution.perception import CONTACT_M, Perceived, SeenThing, things_in
+from sec_lab.execution.solids import gap_between
 from sec_lab.learning import learn
 from sec_lab.recording import Recording
 from sec_lab.worlds.katana.records import Camera, Floats, Move, Point
@@ -259,10 +261,12 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
     # The tip stands off the border where the demonstrations touched: seen from the origin, on this side of it.
     side = facing + skill.side_rad
     outwards = np.array([np.cos(side), np.sin(side)])
-    border = border_distance(first.footprint_m, first.centre_m[:2], outwards)
-    touch = first.centre_m[:2] + (border + skill.standoff_m) * outwards
     height = float(np.median(skill.touches.points_m[:, 2] + first.top_m / 2))
-    over = max(_OVER_M, *(thing.top_m + 0.05 for thing in (first, second)))
+    # What is narrower above is touched where the tip is, not at its base.
+    at_height = first.footprint_m if first.solid is None else first.solid.section_m(height)
+    border = border_distance(at_height, first.centre_m[:2], outwards)
+    touch = first.centre_m[:2] + (border + skill.standoff_m) * outwards
+    over = max(_OVER_M, *(thing.top_m + 0.05 for thing in things))
     at, steps = touch, []
     for rule in skill.rules:
         moves: tuple[Move, ...]
@@ -274,7 +278,8 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
                 Move(_at(touch, height), name="reach", speed_m_s=skill.speed_m_s),
             )
         elif rule.change == "NT" and set(rule.pair) == {skill.first, skill.second}:
-            at = found.E1_m + (segment_length(found) + skill.press_m) * way
+            back = first.centre_m[:2] - border_distance(at_height, first.centre_m[:2], -way) * way
+            at = back + (segment_length(found) + skill.press_m) * way
             moves = (Move(_at(at, height), name="bring", speed_m_s=skill.speed_m_s),)
         elif rule.change == "TN" and skill.prime in rule.pair:
             away = at + (_CLEARANCE_M + 0.01) * outwards
@@ -285,11 +290,19 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
                 Move(_at(at, over), name="up", speed_m_s=0.1),
                 Move(home_m, name="home", speed_m_s=_FREE_M_S),
             )
-        else:
+        elif rule.change == "AN" and skill.prime in rule.pair:
             # The prime mover comes into view on its way to the first object.
             continue
+        else:
+            raise ValueError(f"rule: expected one that moves follow from, got {told(rule)} in column {rule.column}")
         steps.append(Step(rule, moves, facing, rule.column == skill.rules[-1].column))
+    _check_way(steps, first, second, things, over_m=over)
     return tuple(steps)
+
+
+def told(rule: Rule) -> str:
+    """A rule in words, such as "{red box, robot arm} N→T"."""
+    return "{" + ", ".join(sorted(rule.pair)) + "} " + "→".join(rule.change)
 
 
 def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, SeenThing]:
@@ -305,8 +318,6 @@ def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, S
     SceneError
         If one is missing, there are two candidates, one is not on the table, or they touch already.
     """
-    from sec_lab.execution.perception import CONTACT_M, gap_m
-
     seen = {thing.name: thing for thing in things}
     for name in (skill.first, skill.second):
         if name not in seen:
@@ -316,9 +327,31 @@ def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, S
         if not 0.01 < seen[name].top_m < 0.2 or seen[name].bottom_m < -0.01:
             raise SceneError(f"scene: expected {name!r} on the table, got its top at {seen[name].top_m:.3f} m")
     first, second = seen[skill.first], seen[skill.second]
-    if gap_m(first.points_m, second.points_m) < CONTACT_M[0]:
+    if first.solid is None or second.solid is None:
+        raise ValueError("things: expected those of a whole look, with outlines, got some without")
+    if gap_between(first.solid, second.solid) < CONTACT_M[0]:
         raise SceneError(f"scene: expected {skill.first!r} and {skill.second!r} apart, got them touching already")
     return first, second
+
+
+def _check_way(
+    steps: Sequence[Step], first: SeenThing, second: SeenThing, things: Sequence[SeenThing], *, over_m: float
+) -> None:
+    """Nothing if the way is free; otherwise a SceneError that names what is in it."""
+    others = [
+        (thing.name, thing.solid)
+        for thing in things
+        if thing.solid is not None and thing.name not in (first.name, second.name)
+    ]
+    moves = [move for step in steps for move in step.moves]
+    met = obstacle(moves, others, below_m=over_m)
+    if met:
+        raise SceneError(f"scene: expected a free way for the arm, got {met!r} in it")
+    length = segment_length(intersections(first, second))
+    vector = connection_vector(first, second)[:2]
+    met = swept(first.solid, length * vector / np.linalg.norm(vector), others) if first.solid is not None else ""
+    if met:
+        raise SceneError(f"scene: expected a free way from {first.name!r} to {second.name!r}, got {met!r} in it")
 
 
 def _measured(

@@ -99,9 +99,10 @@ def write_graphml(folder: Path, *, jobs: int = 1) -> tuple[Path, ...]:
 def _perceived_beside(path: Path) -> Path:
     given = read_demonstration(path)
     camera = given.scene.camera
-    seen = perceive(given.recording, camera)
     # Of the truth, only the path of the tip is used, which the arm knows from its own joints.
-    write_enriched(path.with_suffix(".graphml"), Demonstrated(given.recording, camera, seen, given.truth.tip_m))
+    tip = given.truth.tip_m
+    seen = perceive(given.recording, camera, tip_m=tip)
+    write_enriched(path.with_suffix(".graphml"), Demonstrated(given.recording, camera, seen, tip))
     return path.with_suffix(".graphml")
 
 

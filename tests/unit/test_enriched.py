@@ -25,7 +25,7 @@ def movies() -> dict[str, Demonstrated]:
     found = {}
     for number in (3, 6):
         given = read_demonstration(DEMONSTRATIONS / f"demonstration_0{number}.npz")
-        seen = perceive(given.recording, given.scene.camera)
+        seen = perceive(given.recording, given.scene.camera, tip_m=given.truth.tip_m)
         found[f"demonstration_0{number}"] = Demonstrated(given.recording, given.scene.camera, seen, given.truth.tip_m)
     return found
 
