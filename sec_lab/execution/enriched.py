@@ -1,56 +1,16 @@
-"""Enriched event chains (A.2, §2.10.3): a demonstration as a GraphML file tells it, which is enough to execute.
+"""Enriched event chains (A.2, §2.10.3): a demonstration without its movie, with all that execution needs of it."""
 
-A file is the thesis's dialect (A.2) with node positions in metres; :func:`sec_lab.graphml.read` reads it as the
-observation that it is. What execution needs besides stands in attributes of a namespace of its own:
-
-=====================  ============  ================================================================================
-attribute              of            what
-=====================  ============  ================================================================================
-``frames_per_second``  the document  of the movie
-``tip_path_m``         a key frame   x y z of the arm's tip, frame by frame, from this key frame to the next
-``footprint_m``        a node        corners of the thing seen from above, x y, anticlockwise
-``centre_m``           a node        middle of the footprint, at half the height
-``height_m``           a node        lowest and highest that is seen of the thing, above the table
-``parts``              a node        parts in the picture that are not much smaller than the largest
-``gap_m``              an edge       of the last key frame: gap between the two as it was seen last
-=====================  ============  ================================================================================
-
-All lengths are in the world's metres, whatever camera saw them, and are written to a micrometre.
-"""
-
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
-from xml.etree import ElementTree
+from typing import Protocol
 
 import numpy as np
-from defusedxml.ElementTree import fromstring
 
-from sec_lab.execution.perception import TABLE, Perceived, SeenThing, decisive_rows, things_in
-from sec_lab.files import UnusableFileError, read_whole, write_whole
-from sec_lab.graphml import read_observation
-from sec_lab.graphml.dialect import to_text
-from sec_lab.graphml.markup import elements, finite_number, shown, whole_number
-from sec_lab.observation import Observation
+from sec_lab.execution.anchors import PrimeMover, prime_mover
+from sec_lab.execution.perception import COLOURS, MINIMUM_PX, Perceived, SeenThing, things_in
 from sec_lab.recording import Recording
+from sec_lab.segmentation.colour import colour_segments
 from sec_lab.worlds.katana.records import Camera, Floats
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
-
-NAMESPACE = "urn:sec-lab:execution"
-"""Of the attributes that A.2 does not know; a name, no address."""
-
-_PREFIX = "execution"
-_EXPECTED = "a demonstration in GraphML"
-_ALLOWED: Mapping[str, frozenset[str]] = {
-    "GraphML": frozenset({"frames_per_second"}),
-    "KeyFrame": frozenset({"tip_path_m"}),
-    "Node": frozenset({"footprint_m", "centre_m", "height_m", "parts"}),
-    "Edge": frozenset({"gap_m"}),
-}
 
 
 class Filmed(Protocol):
@@ -72,6 +32,10 @@ class Filmed(Protocol):
     def tip_m(self) -> Floats:
         """(n, 3) float64: of the arm, from its own joints."""
 
+    @property
+    def joints_rad(self) -> Floats | None:
+        """(n, 7) float64: angles of these joints, the two fingers last, where they are known."""
+
 
 @dataclass(frozen=True, eq=False)
 class Enriched:
@@ -86,6 +50,10 @@ class Enriched:
     frames_per_second : float
     things : mapping of int to tuple of SeenThing
         By key frame.
+    changed_px : mapping of int to mapping of str to int
+        By key frame, changed pixels of the difference image with the key frame before, by segment (D1).
+    joints_rad : (n, 7) float64, optional
+        Angles of the arm's joints, the two fingers last.
 
     Raises
     ------
@@ -97,6 +65,8 @@ class Enriched:
     tip_m: Floats
     frames_per_second: float
     things: Mapping[int, tuple[SeenThing, ...]]
+    changed_px: Mapping[int, Mapping[str, int]]
+    joints_rad: Floats | None = None
 
     def __post_init__(self) -> None:
         tip = np.array(self.tip_m, dtype=np.float64)
@@ -105,10 +75,19 @@ class Enriched:
             raise ValueError(f"tip_m: expected finite numbers of shape (more than {frames[-1]}, 3), got {tip.shape}")
         if not (np.isfinite(self.frames_per_second) and self.frames_per_second > 0):
             raise ValueError(f"frames_per_second: expected a number above 0, got {self.frames_per_second}")
-        if sorted(self.things) != frames:
-            raise ValueError(f"things: expected those of the key frames {frames}, got {sorted(self.things)}")
+        for what in ("things", "changed_px"):
+            if sorted(getattr(self, what)) != frames:
+                raise ValueError(
+                    f"{what}: expected those of the key frames {frames}, got {sorted(getattr(self, what))}"
+                )
         tip.setflags(write=False)
         object.__setattr__(self, "tip_m", tip)
+        if self.joints_rad is not None:
+            joints = np.array(self.joints_rad, dtype=np.float64)
+            if joints.shape != (len(tip), 7) or not np.isfinite(joints).all():
+                raise ValueError(f"joints_rad: expected finite numbers of shape {(len(tip), 7)}, got {joints.shape}")
+            joints.setflags(write=False)
+            object.__setattr__(self, "joints_rad", joints)
 
     def things_at(self, frame: int) -> tuple[SeenThing, ...]:
         """Things as they were seen at the key frame whose chunk of time a frame belongs to.
@@ -127,6 +106,31 @@ class Enriched:
             raise ValueError(f"frame: expected {min(self.things)} or later, got {frame}")
         return self.things[max(begun)]
 
+    def difference(self, before: int, after: int) -> PrimeMover:
+        """D1: in which segment two key frames differ; over key frames between them, pixels that change are added up.
+
+        Parameters
+        ----------
+        before, after : int
+            Key frames.
+
+        Raises
+        ------
+        ValueError
+            If they are none, or nothing changed.
+        """
+        for frame in (before, after):
+            if frame not in self.changed_px:
+                raise ValueError(f"frame: expected one of the key frames {sorted(self.changed_px)}, got {frame}")
+        total: dict[str, int] = {}
+        for frame, changed in self.changed_px.items():
+            if before < frame <= after:
+                for name, n in changed.items():
+                    total[name] = total.get(name, 0) + n
+        if not any(total.values()):
+            raise ValueError(f"key frames {before} and {after}: expected a change of a named segment, got none")
+        return PrimeMover(max(total, key=lambda name: total[name]), total)
+
 
 def enrich(demonstrated: Filmed) -> Enriched:
     """Leave the movie of a demonstration, and keep what was seen at its key frames.
@@ -140,206 +144,19 @@ def enrich(demonstrated: Filmed) -> Enriched:
     Enriched
     """
     frames = set(demonstrated.perceived.observation.key_frames.tolist())
-    things = {}
-    for frame in demonstrated.recording:
-        if frame.index in frames:
-            things[frame.index] = things_in(frame, demonstrated.camera)
-    fps = demonstrated.recording.frames_per_second or 20.0
-    return Enriched(demonstrated.perceived, demonstrated.tip_m, fps, things)
-
-
-def write_enriched(path: str | os.PathLike[str], demonstration: Filmed | Enriched) -> None:
-    """Write a demonstration as GraphML (A.2) with what execution needs, whole or not at all.
-
-    Parameters
-    ----------
-    path : path-like
-        Its folder must exist.
-    demonstration : Demonstrated or Enriched
-
-    Raises
-    ------
-    UnusableFileError
-        If it cannot be written.
-    ValueError
-        If the positions of what was seen are not in metres.
-    """
-    given = demonstration if isinstance(demonstration, Enriched) else enrich(demonstration)
-    observation = given.perceived.observation
-    if observation.position_unit != "m":
-        raise ValueError(f"demonstration: expected positions in metres, got {observation.position_unit!r}")
-    root = fromstring(to_text(observation).encode())
-    root.set(_name("frames_per_second"), repr(float(given.frames_per_second)))
-    keys = root.findall("KeyFrame")
-    frames = observation.key_frames.tolist()
-    for key, begin, end in zip(keys, frames, [*frames[1:], len(given.tip_m)], strict=True):
-        key.set(_name("tip_path_m"), _told(given.tip_m[begin:end]))
-        seen = {thing.label: thing for thing in given.things[begin]}
-        for node in key.findall("Node"):
-            if int(node.attrib["id"]) in seen:
-                _describe(node, seen[int(node.attrib["id"])])
-    names = {str(segment): str(name) for segment, name in observation.names.items()}
-    for edge in keys[-1].findall("Edge"):
-        gap = given.perceived.last_gap_m(names[edge.attrib["source"]], names[edge.attrib["target"]])
-        if np.isfinite(gap):
-            edge.set(_name("gap_m"), _told(np.array([[gap]])))
-    ElementTree.register_namespace(_PREFIX, NAMESPACE)
-    ElementTree.indent(root)
-    text = ElementTree.tostring(root, encoding="unicode")
-    write_whole(path, f"<?xml version='1.0' encoding='UTF-8'?>\n{text}\n")
-
-
-def read_enriched(path: str | os.PathLike[str]) -> Enriched:
-    """Read what :func:`write_enriched` wrote.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    Enriched
-        Things have no points of their surface but the corners of their footprints, below and above.
-
-    Raises
-    ------
-    UnusableFileError
-        If the file is missing, no GraphML, an observation without what execution needs, or contradicts itself. It is
-        a ValueError as well as an OSError.
-    """
-    file = Path(path)
-    observation = read_observation(file)
-    data = read_whole(file, expected=_EXPECTED)
-    try:
-        return _enriched(observation, data)
-    except ValueError as error:
-        raise UnusableFileError(f"{file}: {error}") from error
-
-
-def read_enriched_folder(folder: str | os.PathLike[str]) -> dict[str, Enriched]:
-    """All demonstrations of a folder (``*.graphml``), by the names of their files, in the order of these.
-
-    Parameters
-    ----------
-    folder : path-like
-
-    Raises
-    ------
-    UnusableFileError
-        If there is none, or one cannot be read.
-    """
-    paths = sorted(Path(folder).glob("*.graphml"))
-    if not paths:
-        raise UnusableFileError(f"{Path(folder)}: expected files of demonstrations (*.graphml), got none")
-    return {path.stem: read_enriched(path) for path in paths}
-
-
-def _enriched(observation: Observation, data: bytes) -> Enriched:
-    if observation.position_unit != "m":
-        raise ValueError(f"position_unit: expected 'm', got {observation.position_unit!r}")
-    children = elements(data)
-    root = next(children)
-    _check_ours(root)
-    fps = finite_number(_needed(root, "frames_per_second"), what="frames_per_second")
-    path: list[Floats] = []
+    names = {label: colour.name for label, colour in enumerate(COLOURS, start=1)}
     things: dict[int, tuple[SeenThing, ...]] = {}
-    gaps: dict[tuple[str, str], Floats] = {}
-    for element in children:
-        if element.tag != "KeyFrame":
+    changed: dict[int, Mapping[str, int]] = {}
+    last = None
+    for frame in demonstrated.recording:
+        if frame.index not in frames:
             continue
-        for one in element.iter():
-            _check_ours(one)
-        frame = whole_number(element.attrib["ID"], what="key frame ID")
-        if frame != sum(map(len, path)):
-            raise ValueError(
-                f"key frame {frame}: expected a path of the tip up to it, got one of {sum(map(len, path))}"
-            )
-        try:
-            path.append(_numbers(_needed(element, "tip_path_m"), 3, what="tip_path_m"))
-            things[frame] = tuple(_thing(node) for node in element.findall("Node") if node.get(_name("centre_m")))
-        except ValueError as error:
-            raise ValueError(f"key frame {frame}: {error}") from error
-        gaps = {}
-        names = {node.attrib["id"]: node.get("type", "") for node in element.findall("Node")}
-        for edge in element.findall("Edge"):
-            gap = edge.get(_name("gap_m"))
-            pair = names[edge.attrib["source"]], names[edge.attrib["target"]]
-            gaps[pair] = _numbers(gap, 1, what=f"gap_m of {pair}")[0] if gap else np.array([np.inf])
-    moved = _moved(list(things.values()))
-    # In the end everything rests.
-    perceived = Perceived(observation, decisive_rows(observation), gaps, moved, dict.fromkeys(moved, 0.0))
-    return Enriched(perceived, np.concatenate(path), fps, things)
-
-
-def _thing(node: "Element") -> SeenThing:
-    name = node.get("type")
-    segment = whole_number(node.attrib["id"], what="node id")
-    if not name:
-        raise ValueError(f"node {segment}: expected a type, got none")
-    centre = _numbers(_needed(node, "centre_m"), 3, what=f"{name}: centre_m")
-    if len(centre) != 1:
-        raise ValueError(f"{name}: centre_m: expected one point, got {len(centre)}")
-    nothing = np.zeros((0, 3))
-    if name == TABLE:
-        return SeenThing(name, segment, nothing, nothing[:, :2], centre[0], 0.0, 0.0, 1)
-    corners = _numbers(_needed(node, "footprint_m"), 2, what=f"{name}: footprint_m")
-    if len(corners) < 3:
-        raise ValueError(f"{name}: footprint_m: expected at least three corners, got {len(corners)}")
-    low, high = _numbers(_needed(node, "height_m"), 2, what=f"{name}: height_m")[0].tolist()
-    n_parts = whole_number(_needed(node, "parts"), what=f"{name}: parts")
-    points = np.concatenate([np.c_[corners, np.full(len(corners), height)] for height in (low, high)])
-    return SeenThing(name, segment, points, corners, centre[0], high, low, n_parts)
-
-
-def _describe(node: "Element", thing: SeenThing) -> None:
-    node.set(_name("centre_m"), _told(thing.centre_m[None]))
-    if thing.name == TABLE:
-        return
-    node.set(_name("footprint_m"), _told(thing.footprint_m))
-    node.set(_name("height_m"), _told(np.array([[thing.bottom_m, thing.top_m]])))
-    node.set(_name("parts"), str(thing.n_parts))
-
-
-def _moved(seen: Sequence[tuple[SeenThing, ...]]) -> dict[str, float]:
-    """How far each thing lies at the last key frame at which it was seen from where it was at the first."""
-    first: dict[str, Floats] = {}
-    last: dict[str, Floats] = {}
-    for things in seen:
-        for thing in things:
-            first.setdefault(thing.name, thing.centre_m)
-            last[thing.name] = thing.centre_m
-    return {name: float(np.linalg.norm(last[name] - first[name])) for name in first}
-
-
-def _name(attribute: str) -> str:
-    return f"{{{NAMESPACE}}}{attribute}"
-
-
-def _needed(element: "Element", attribute: str) -> str:
-    value = element.get(_name(attribute))
-    if value is None:
-        raise ValueError(f"<{element.tag}>: expected what execution needs ({attribute}), got an observation without it")
-    return value
-
-
-def _check_ours(element: "Element") -> None:
-    known = {_name(attribute) for attribute in _ALLOWED.get(element.tag, frozenset())}
-    for attribute in element.attrib:
-        if attribute.startswith(f"{{{NAMESPACE}}}") and attribute not in known:
-            raise ValueError(
-                f"<{element.tag}>: expected no attribute of execution but {sorted(known)}, got {attribute}"
-            )
-
-
-def _told(points: Floats) -> str:
-    """Points in metres, to a micrometre; a comma after each."""
-    # Adding 0 turns -0 into 0.
-    return ", ".join(" ".join(f"{value + 0.0:.6f}" for value in np.round(point, 6)) for point in points)
-
-
-def _numbers(text: str, width: int, *, what: str) -> Floats:
-    rows = [row.split() for row in text.split(",")]
-    wrong = next((row for row in rows if len(row) != width), None)
-    if wrong is not None:
-        raise ValueError(f"{what}: expected {width} numbers between commas, got {shown(' '.join(wrong))}")
-    return np.array([[finite_number(value, what=what) for value in row] for row in rows])
+        labels = colour_segments(frame.image, COLOURS, minimum_px=MINIMUM_PX, components="all")
+        things[frame.index] = things_in(frame, demonstrated.camera)
+        counts: Mapping[str, int] = {}
+        if last is not None and not np.array_equal(last, labels):
+            counts = prime_mover(last, labels, names).changed_px
+        changed[frame.index] = {name: n for name, n in counts.items() if n}
+        last = labels
+    fps = demonstrated.recording.frames_per_second or 20.0
+    return Enriched(demonstrated.perceived, demonstrated.tip_m, fps, things, changed, demonstrated.joints_rad)

@@ -107,12 +107,16 @@ class Demonstrated:
     perceived : Perceived
     tip_m : (n, 3) float64
         Of the arm, from its own joints.
+    joints_rad : (n, 7) float64, optional
+        Angles of these joints, the two fingers last. Without them nothing is known of the hand: it then faces along the
+        connection vector, and its fingers stay as they are.
     """
 
     recording: Recording
     camera: Camera
     perceived: Perceived
     tip_m: Floats
+    joints_rad: Floats | None = None
 
     @property
     def frames_per_second(self) -> float:

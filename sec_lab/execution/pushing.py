@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from sec_lab.execution.enriched import read_enriched_folder, write_enriched
+from sec_lab.execution.enriched_files import read_enriched_folder, write_enriched
 from sec_lab.execution.loop import Outcome, execute_skill
 from sec_lab.execution.perception import perceive
 from sec_lab.execution.planning import Demonstrated, Skill, learn_skill
@@ -99,10 +99,10 @@ def write_graphml(folder: Path, *, jobs: int = 1) -> tuple[Path, ...]:
 def _perceived_beside(path: Path) -> Path:
     given = read_demonstration(path)
     camera = given.scene.camera
-    # Of the truth, only the path of the tip is used, which the arm knows from its own joints.
-    tip = given.truth.tip_m
-    seen = perceive(given.recording, camera, tip_m=tip)
-    write_enriched(path.with_suffix(".graphml"), Demonstrated(given.recording, camera, seen, tip))
+    # Of the truth, only the path of the tip and the angles of the joints are used, which the arm itself knows.
+    seen = perceive(given.recording, camera, tip_m=given.truth.tip_m)
+    one = Demonstrated(given.recording, camera, seen, given.truth.tip_m, given.truth.joints_rad)
+    write_enriched(path.with_suffix(".graphml"), one)
     return path.with_suffix(".graphml")
 
 

@@ -7,11 +7,14 @@ import pytest
 
 from sec_lab import graphml
 from sec_lab.codes import to_letters
-from sec_lab.execution.enriched import Enriched, enrich, read_enriched, read_enriched_folder, write_enriched
-from sec_lab.execution.perception import perceive, things_in
+from sec_lab.execution.anchors import prime_mover
+from sec_lab.execution.enriched import Enriched, enrich
+from sec_lab.execution.enriched_files import read_enriched, read_enriched_folder, write_enriched
+from sec_lab.execution.perception import COLOURS, perceive, things_in
 from sec_lab.execution.planning import Demonstrated, Skill, learn_skill, plan
 from sec_lab.execution.pushing import DEMONSTRATIONS, main, pushing_skill
 from sec_lab.files import UnusableFileError
+from sec_lab.viz.watched import colour_labels, frames_at
 from sec_lab.worlds.katana import example_scene, view
 from sec_lab.worlds.katana.stored import read_demonstration
 
@@ -26,7 +29,10 @@ def movies() -> dict[str, Demonstrated]:
     for number in (3, 6):
         given = read_demonstration(DEMONSTRATIONS / f"demonstration_0{number}.npz")
         seen = perceive(given.recording, given.scene.camera, tip_m=given.truth.tip_m)
-        found[f"demonstration_0{number}"] = Demonstrated(given.recording, given.scene.camera, seen, given.truth.tip_m)
+        truth = given.truth
+        found[f"demonstration_0{number}"] = Demonstrated(
+            given.recording, given.scene.camera, seen, truth.tip_m, truth.joints_rad
+        )
     return found
 
 
@@ -72,6 +78,8 @@ def test_stored_files_are_what_is_perceived_today(folder: Path) -> None:
             stored[name].perceived.observation.key_frames, now[name].perceived.observation.key_frames
         )
         np.testing.assert_allclose(stored[name].tip_m, now[name].tip_m, atol=2e-6)
+        np.testing.assert_allclose(stored[name].joints_rad, now[name].joints_rad, atol=2e-4)
+        assert stored[name].changed_px == now[name].changed_px
     same_numbers(learn_skill(stored), learn_skill(now), atol=ROUNDING_M)
 
 
@@ -124,6 +132,8 @@ def test_things_are_those_of_the_chunk_of_time() -> None:
         ('execution:footprint_m="', 'execution:footprint_m="a b, ', "footprint_m: expected a finite number, got 'a'"),
         ('execution:parts="1"', 'execution:parts="one"', "parts: expected a whole number"),
         (' execution:height_m="', ' execution:parts_m="', "expected no attribute of execution but"),
+        ('execution:joint_path_rad="', 'execution:joint_path_rad="1 2, ', "expected 7 numbers between commas"),
+        ('execution:changed_px="', 'execution:changed_px="-', "changed_px: expected"),
         ("</GraphML>", "", "well-formed"),
         ("<GraphML", "<!DOCTYPE a><GraphML", "refused as unsafe"),
     ],
@@ -157,9 +167,13 @@ def test_nothing_is_left_of_what_cannot_be_written(tmp_path: Path) -> None:
 def test_records_say_what_is_wrong() -> None:
     told = read_enriched(DEMONSTRATIONS / "demonstration_06.graphml")
     with pytest.raises(ValueError, match="tip_m: expected finite numbers of shape"):
-        Enriched(told.perceived, told.tip_m[:4], 20.0, told.things)
+        Enriched(told.perceived, told.tip_m[:4], 20.0, told.things, told.changed_px)
     with pytest.raises(ValueError, match="things: expected those of the key frames"):
-        Enriched(told.perceived, told.tip_m, 20.0, {0: ()})
+        Enriched(told.perceived, told.tip_m, 20.0, {0: ()}, told.changed_px)
+    with pytest.raises(ValueError, match="joints_rad: expected finite numbers of shape"):
+        Enriched(told.perceived, told.tip_m, 20.0, told.things, told.changed_px, np.zeros((4, 7)))
+    with pytest.raises(ValueError, match="expected one of the key frames"):
+        told.difference(0, 1)
 
 
 def test_a_movie_is_left_for_what_was_seen_at_its_key_frames(movies: dict[str, Demonstrated]) -> None:
@@ -169,6 +183,12 @@ def test_a_movie_is_left_for_what_was_seen_at_its_key_frames(movies: dict[str, D
         for mine, direct in zip(kept.things[frame], one.things_at(frame), strict=True):
             assert mine.name == direct.name
             np.testing.assert_array_equal(mine.footprint_m, direct.footprint_m)
+    frames = one.perceived.observation.key_frames.tolist()
+    looks = frames_at(one.recording, frames[1:3])
+    names = {label: colour.name for label, colour in enumerate(COLOURS, start=1)}
+    direct = prime_mover(*(colour_labels(look) for look in looks), names)
+    assert kept.difference(*frames[1:3]).changed_px == {name: n for name, n in direct.changed_px.items() if n}
+    assert direct.name == "robot arm"
     with pytest.raises(ValueError, match="frame: expected one of the movie, got 9999"):
         one.things_at(9999)
 

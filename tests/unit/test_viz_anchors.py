@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sec_lab.execution.anchors import connection_vector, in_frame, intersections, prime_mover, segment_length
-from sec_lab.execution.enriched import Enriched, read_enriched_folder
-from sec_lab.execution.planning import plan
+from sec_lab.execution.enriched import Enriched
+from sec_lab.execution.enriched_files import read_enriched_folder
 from sec_lab.execution.pushing import DEMONSTRATIONS, pushing_skill
 from sec_lab.execution.recorded_anchors import NAMES, RecordedAnchors, nearest_points, recorded_anchors
 from sec_lab.recording import Recording
@@ -17,7 +17,7 @@ from sec_lab.viz.anchors import (
     picture_axes,
 )
 from sec_lab.viz.watched import draw_seen, frames_at, projected
-from sec_lab.worlds.katana import Camera, project
+from sec_lab.worlds.katana import Camera, Move, project
 from sec_lab.worlds.katana.demonstrations import SEED, demonstration_scene
 
 
@@ -113,10 +113,10 @@ def test_motion_is_drawn_over_demonstration_and_scene(
     draw_demonstrated(picture, camera, recorded, ax=left, title="A")
     seen = demonstrations["demonstration_04"].things_at(0)
     red, green = (next(thing for thing in seen if thing.name == name) for name in ("red box", "green box"))
-    steps = plan(pushing_skill(), seen, home_m=(-0.1, -0.33, 0.3))
+    moves = [Move((*red.centre_m[:2], 0.15)), Move((*green.centre_m[:2], 0.03)), Move((-0.1, -0.33, 0.3))]
     found = intersections(red, green)
     draw_planned(
-        picture, camera, found, [move for step in steps for move in step.moves], origin_m=red.centre_m,
+        picture, camera, found, moves, origin_m=red.centre_m,
         connection_m=connection_vector(red, green), start_m=(-0.1, 0.33, 0.3), height_m=0.03, ax=right, title="B",
     )  # fmt: skip
     said = [[text.get_text() for text in ax.texts if text.get_text()] for ax in (left, right)]
