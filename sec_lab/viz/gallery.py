@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from sec_lab.codes import Relation
@@ -109,7 +110,7 @@ def draw_gallery(
         bar_in = PAGE_WIDTH_IN - right_in + 0.12
         bar_ax = axes_at(figure, left_in=bar_in, top_in=_TITLE_IN, width_in=0.14, height_in=high_in)
         maps = [image for ax in figure.axes for image in ax.images if image.get_gid() == "disparity"]
-        bar = figure.colorbar(maps[0], cax=bar_ax)
+        bar = figure.colorbar(maps[0], cax=bar_ax, ticks=MaxNLocator(4, steps=[1, 2, 5, 10]))
         bar.set_label(measure, fontsize=SMALL_PT, color=SOFT)
         bar.ax.tick_params(labelsize=SMALL_PT, colors=SOFT, length=2)
         bar.outline.set_visible(False)
