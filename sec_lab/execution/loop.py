@@ -117,7 +117,7 @@ def execute_skill(
         At the first look, before anything moves: nothing can be done, or not by this arm.
     """
     run = Run(scene, fault=fault, watched=True)
-    steps = _planned(run, scene, skill)
+    steps = _planned(run, scene, skill, again=False)
     verdicts: list[Verdict] = []
     attempt, gave_up = 0, ""
     while True:
@@ -144,7 +144,7 @@ def execute_skill(
             gave_up = f"{attempt} attempts failed"
             break
         try:
-            steps = _planned(run, scene, skill)
+            steps = _planned(run, scene, skill, again=True)
         except ValueError as error:
             gave_up = str(error)
             break
@@ -203,22 +203,22 @@ def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None)
         How wide the gap looked while the one pushed the other, so that there was none.
     """
     gap = perceived.last_gap_m(skill.first, skill.second)
-    most = CONTACT_M[0] if pressed_m is None else min(pressed_m, _MOST_OFF_M) + _LOOSE_M
+    most = CONTACT_M[0] if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M) + _LOOSE_M
     if gap <= most:
         return ""
     pair = _told(frozenset((skill.first, skill.second)))
     return f"{pair}: expected a gap of at most {1000 * most:.1f} mm, got {1000 * gap:.1f} mm"
 
 
-def _planned(run: Run, scene: Scene, skill: Skill) -> tuple[Step, ...]:
+def _planned(run: Run, scene: Scene, skill: Skill, *, again: bool) -> tuple[Step, ...]:
     """A plan for what is seen now, all of it within the arm's reach from where it is."""
-    steps = plan(skill, things_in(run.view(), scene.camera), home_m=scene.home_m)
+    steps = plan(skill, things_in(run.view(), scene.camera), home_m=scene.home_m, again=again)
     run.check(*(move for step in steps for move in step.moves))
     return steps
 
 
 def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill: Skill) -> str:
-    """Make the moves of a rule and look; go on a little as long as nothing but the touching is missing that it asks for.
+    """Make the moves of a rule and look; go on a little as long as only the touching is missing that it asks for.
 
     What is different from the model then is returned; empty if nothing.
     """

@@ -114,7 +114,8 @@ class Perceived:
     chain : EventChain or None
         Its rows with a change between N and T (§2.10.1); None if there is none.
     gaps_m : dict of pair of str to (n_frames,) float64
-        Gap frame by frame, infinite where one is absent, a little below zero where two that touch look too large; names in the order of :data:`COLOURS`.
+        Gap frame by frame, infinite where one is absent, a little below zero where two that touch look too large;
+        names in the order of :data:`COLOURS`.
     moved_m : dict of str to float
         How far each thing lies from where it was seen first.
     drift_m : dict of str to float

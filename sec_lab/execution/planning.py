@@ -31,6 +31,8 @@ _CLEARANCE_M = 0.045
 _OVER_M = 0.12
 """Least height at which the tip passes over things."""
 _FREE_M_S = 0.3
+_LEAST_SEEN = 0.6
+"""A thing of which only what is above this share of its height is seen hovers, or stands too well hidden."""
 
 
 class SceneError(ValueError):
@@ -237,7 +239,7 @@ def learn_skill(demonstrations: Mapping[str, Demonstrated | Enriched]) -> Skill:
     )
 
 
-def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[Step, ...]:
+def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point, again: bool = False) -> tuple[Step, ...]:
     """Motion for a scene: the rules of the model, one after the other, by vector addition (§2.10.5).
 
     Parameters
@@ -247,6 +249,8 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
         As the camera sees them.
     home_m : tuple of float
         Where the tip goes in the end.
+    again : bool, optional
+        After a failure: the objects may look as if they touched.
 
     Returns
     -------
@@ -255,9 +259,9 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
     Raises
     ------
     SceneError
-        If an object is missing, or they touch already.
+        If an object is missing, or they touch already, or something is in the way.
     """
-    first, second = check_scene(skill, things)
+    first, second = check_scene(skill, things, again=again)
     found = intersections(first, second)
     vector = connection_vector(first, second)
     way = vector[:2] / np.linalg.norm(vector[:2])
@@ -309,13 +313,15 @@ def told(rule: Rule) -> str:
     return "{" + ", ".join(sorted(rule.pair)) + "} " + "→".join(rule.change)
 
 
-def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, SeenThing]:
+def check_scene(skill: Skill, things: Sequence[SeenThing], *, again: bool = False) -> tuple[SeenThing, SeenThing]:
     """First and second object of a scene, or one clear error.
 
     Parameters
     ----------
     skill : Skill
     things : sequence of SeenThing
+    again : bool, optional
+        See :func:`plan`.
 
     Raises
     ------
@@ -328,12 +334,13 @@ def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, S
             raise SceneError(f"scene: expected something that looks like {name!r}, got {sorted(seen)}")
         if seen[name].n_parts > 1:
             raise SceneError(f"scene: expected one candidate for {name!r}, got {seen[name].n_parts}")
-        if not 0.01 < seen[name].top_m < 0.2 or seen[name].bottom_m < -0.01:
-            raise SceneError(f"scene: expected {name!r} on the table, got its top at {seen[name].top_m:.3f} m")
+        top, bottom = seen[name].top_m, seen[name].bottom_m
+        if not 0.01 < top < 0.2 or not -0.01 < bottom < _LEAST_SEEN * top:
+            raise SceneError(f"scene: expected {name!r} on the table, got it from {bottom:.3f} to {top:.3f} m above it")
     first, second = seen[skill.first], seen[skill.second]
     if first.solid is None or second.solid is None:
         raise ValueError("things: expected those of a whole look, with outlines, got some without")
-    if gap_between(first.solid, second.solid) < CONTACT_M[0]:
+    if not again and gap_between(first.solid, second.solid) < CONTACT_M[0]:
         raise SceneError(f"scene: expected {skill.first!r} and {skill.second!r} apart, got them touching already")
     return first, second
 
