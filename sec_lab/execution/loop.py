@@ -9,7 +9,7 @@ from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.execution.motion import Run, UnreachableError
 from sec_lab.execution.perception import CONTACT_M, TABLE, Perceived, Watcher, things_in
-from sec_lab.execution.planning import Skill, Step, plan, shifted, told
+from sec_lab.execution.planning import Skill, Step, plan, shifted, told, way_home
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
 from sec_lab.worlds.katana.records import Fault, Move, Scene, Truth
@@ -268,13 +268,14 @@ def _once_still(run: Run, watcher: Watcher, seen: Callable[[], None], skill: Ski
 def _withdraw(run: Run, scene: Scene, seen: Callable[[], None]) -> None:
     """Up and home, whatever has happened."""
     x, y, z = run.tip_m
-    home = Move(scene.home_m, name="home", speed_m_s=0.3)
     for height in _OVER_M:
-        up = Move((x, y, height), name="up", speed_m_s=0.1)
-        if z < height and _reaches(run, up, home):
-            run.move(up)
+        ways = Move((x, y, max(z, height)), name="up", speed_m_s=0.1), *way_home((x, y, max(z, height)), scene.home_m)
+        if _reaches(run, *ways):
             break
-    run.move(home)
+    else:
+        ways = (Move(scene.home_m, name="home", speed_m_s=0.3),)
+    for move in ways:
+        run.move(move)
     seen()
 
 

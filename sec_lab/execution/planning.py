@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sec_lab.action_model import ActionModel
 from sec_lab.codes import LETTER_OF, Relation
@@ -31,6 +32,7 @@ _CLEARANCE_M = 0.045
 _OVER_M = 0.12
 """Least height at which the tip passes over things."""
 _FREE_M_S = 0.3
+_NEAR_COLUMN_M, _OUT_M = 0.20, 0.26
 _LEAST_SEEN = 0.6
 """A thing of which only what is above this share of its height is seen hovers, or stands too well hidden."""
 
@@ -294,10 +296,7 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point, again: boo
             moves = (Move(_at(away, height), name="leave", speed_m_s=skill.speed_m_s),)
             at = away
         elif rule.change == "NA" and skill.prime in rule.pair:
-            moves = (
-                Move(_at(at, over), name="up", speed_m_s=0.1),
-                Move(home_m, name="home", speed_m_s=_FREE_M_S),
-            )
+            moves = (Move(_at(at, over), name="up", speed_m_s=0.1), *way_home((*at, over), home_m))
         elif rule.change == "AN" and skill.prime in rule.pair:
             # The prime mover comes into view on its way to the first object.
             continue
@@ -306,6 +305,29 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point, again: boo
         steps.append(Step(rule, moves, facing, rule.column == skill.rules[-1].column))
     _check_way(steps, first, second, things, over_m=over)
     return tuple(steps)
+
+
+def way_home(from_m: ArrayLike, home_m: Point) -> tuple[Move, ...]:
+    """Moves from a place high up to a home (D8); near its own column the arm cannot rise, so it goes outwards first.
+
+    Parameters
+    ----------
+    from_m : (3,) array_like of float
+    home_m : tuple of float
+
+    Examples
+    --------
+    >>> [move.name for move in way_home((0.3, 0.0, 0.15), (-0.1, 0.3, 0.3))]
+    ['home']
+    >>> [move.name for move in way_home((0.12, 0.0, 0.15), (-0.1, 0.3, 0.3))]
+    ['out', 'home']
+    """
+    place = np.asarray(from_m, dtype=np.float64)
+    away = float(np.hypot(place[0], place[1]))
+    home = Move(home_m, name="home", speed_m_s=_FREE_M_S)
+    if away >= _NEAR_COLUMN_M:
+        return (home,)
+    return Move(_at(_OUT_M / away * place[:2], float(place[2])), name="out", speed_m_s=_FREE_M_S), home
 
 
 def told(rule: Rule) -> str:

@@ -102,6 +102,7 @@ class PlantedTrial:
     recognised_at: str
     why: str
     n_attempts: int
+    gave_up: str
     accepted: bool
     touching: bool
 
@@ -213,6 +214,7 @@ def planted_trial(skill: Skill, kind: Failure, *, seed: int, number: int) -> Pla
         wrong[0].rule if wrong else "",
         wrong[0].why if wrong else "",
         done.n_attempts,
+        done.gave_up,
         done.success,
         _touching(done, red, green),
     )
