@@ -8,7 +8,7 @@ import numpy as np
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.execution.motion import Run, UnreachableError
-from sec_lab.execution.perception import CONTACT_M, TABLE, Perceived, Watcher, things_in
+from sec_lab.execution.perception import TABLE, Perceived, Watcher, things_in
 from sec_lab.execution.planning import Skill, Step, plan, shifted, told, way_home
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
@@ -200,10 +200,12 @@ def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None)
     perceived : Perceived
     skill : Skill
     pressed_m : float, optional
-        How wide the gap looked while the one pushed the other, so that there was none.
+        How wide the gap looked while the one pushed the other, so that there was none; what is left out is known from
+        the demonstrations.
     """
     gap = perceived.last_gap_m(skill.first, skill.second)
-    most = CONTACT_M[0] if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M) + _LOOSE_M
+    none = skill.contact_gap_m if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M)
+    most = none + _LOOSE_M
     if gap <= most:
         return ""
     pair = _told(frozenset((skill.first, skill.second)))

@@ -31,6 +31,8 @@ _CLEARANCE_M = 0.045
 """Between the tip and what it goes past: half a hand, and what perception may be off."""
 _OVER_M = 0.12
 """Least height at which the tip passes over things."""
+_LEAST_HEIGHT_M = 0.022
+"""Lower the fingers come too near to the table."""
 _FREE_M_S = 0.3
 _NEAR_COLUMN_M, _OUT_M = 0.20, 0.26
 _LEAST_SEEN = 0.6
@@ -271,7 +273,7 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point, again: boo
     # The tip stands off the border where the demonstrations touched: seen from the origin, on this side of it.
     side = facing + skill.side_rad
     outwards = np.array([np.cos(side), np.sin(side)])
-    height = float(np.median(skill.touches.points_m[:, 2] + first.top_m / 2))
+    height = max(_LEAST_HEIGHT_M, float(np.median(skill.touches.points_m[:, 2] + first.top_m / 2)))
     # What is narrower above is touched where the tip is, not at its base.
     at_height = first.footprint_m if first.solid is None else first.solid.section_m(height)
     border = border_distance(at_height, first.centre_m[:2], outwards)

@@ -241,7 +241,7 @@ def test_a_loose_contact_is_judged_by_the_gap_while_it_was_none(skill: Skill) ->
     def judge(gap_m: float, pressed_m: float | None) -> str:
         return loose(Seen(gap_m), skill, pressed_m=pressed_m)  # type: ignore[arg-type]
 
-    assert judge(0.0004, 0.0) == judge(0.0014, 0.001) == judge(0.0004, -0.001) == judge(0.0006, None) == ""
+    assert judge(0.0004, 0.0) == judge(0.0014, 0.001) == judge(0.0004, -0.001) == judge(0.0005, None) == ""
     assert judge(0.0007, 0.0) == "{green box, red box}: expected a gap of at most 0.5 mm, got 0.7 mm"
     assert judge(0.0016, 0.001) != ""
     # What looked apart by centimetres while it was pushed was no contact.
