@@ -10,9 +10,10 @@ from sec_lab.codes import to_letters
 from sec_lab.execution.anchors import prime_mover
 from sec_lab.execution.enriched import Enriched, enrich
 from sec_lab.execution.enriched_files import read_enriched, read_enriched_folder, write_enriched
-from sec_lab.execution.perception import COLOURS, perceive, things_in
+from sec_lab.execution.perception import perceive
 from sec_lab.execution.planning import Demonstrated, Skill, learn_skill, plan
 from sec_lab.execution.pushing import DEMONSTRATIONS, main, pushing_skill
+from sec_lab.execution.things import COLOURS, things_in
 from sec_lab.files import UnusableFileError
 from sec_lab.viz.watched import colour_labels, frames_at
 from sec_lab.worlds.katana import example_scene, view
