@@ -10,6 +10,7 @@ from sec_lab.event_chain import EventChain
 from sec_lab.execution.motion import Run, check_plan
 from sec_lab.execution.perception import CONTACT_M, TABLE, Perceived, Watcher, things_in
 from sec_lab.execution.planning import Skill, Step, plan, shifted
+from sec_lab.execution.relative_poses import Hand
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
 from sec_lab.worlds.katana.records import Fault, Move, Scene, Truth
@@ -130,7 +131,7 @@ def execute_skill(
                 break
         if agrees:
             break
-        _withdraw(run, scene, seen)
+        _withdraw(run, scene, seen, skill.hand)
         attempt += 1
         if attempt >= most_attempts:
             gave_up = f"{attempt} attempts failed"
@@ -214,7 +215,13 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
         why = agreement(perceived.observation, skill, step.rule.column)
         if not why and step.column_is_last:
             why = loose(perceived, skill)
-        if step.rule.change != "NT" or nudge == _MOST_NUDGES or (why and not why.startswith(_told(pair) + ":")):
+        onward = step.onward or (np.cos(step.heading_rad), np.sin(step.heading_rad), 0.0)
+        if (
+            step.rule.change != "NT"
+            or not any(onward)
+            or nudge == _MOST_NUDGES
+            or (why and not why.startswith(_told(pair) + ":"))
+        ):
             break
         # The model asks for touching; how close that looks, the demonstrations have shown.
         gap = perceived.last_gap_m(*step.rule.pair)
@@ -222,15 +229,16 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
         if not why and (skill.prime in pair or firm):
             break
         further_m += max(_NUDGE_M, min(gap, _MOST_FURTHER_M)) if skill.prime not in pair else _NUDGE_M
-        way = np.array([np.cos(step.heading_rad), np.sin(step.heading_rad), 0.0])
-        moves = (shifted(step.moves[-1], further_m * way),)
+        moves = (shifted(step.moves[-1], further_m * np.array(onward)),)
     rule = f"{_told(frozenset(step.rule.pair))} {step.rule.change[0]}→{step.rule.change[1]}"
     return Verdict(attempt, rule, len(watcher), not why, why)
 
 
-def _withdraw(run: Run, scene: Scene, seen: Callable[[], None]) -> None:
-    """Up and home, whatever has happened."""
+def _withdraw(run: Run, scene: Scene, seen: Callable[[], None], hand: Hand) -> None:
+    """Up and home with empty hands, whatever has happened."""
     x, y, z = run.tip_m
+    if hand.closes:
+        run.move(Move((x, y, z), hand.after, "let go"))
     if z < _OVER_M:
         run.move(Move((x, y, _OVER_M), name="up", speed_m_s=0.1))
     run.move(Move(scene.home_m, name="home", speed_m_s=0.3))

@@ -5,92 +5,48 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sec_lab.action_model import ActionModel
-from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.execution.anchors import (
-    Points,
+    PrimeMover,
     border_distance,
     connection_vector,
     end_points,
     in_frame,
     intersections,
+    prime_mover,
     segment_length,
     start_points,
     touching_points,
 )
-from sec_lab.execution.perception import Perceived, SeenThing, things_in
+from sec_lab.execution.macro import (
+    MacroError,
+    identify_first_touched,
+    identify_prime_mover,
+    identify_second_touched,
+    macro,
+    pose_of_hand,
+    pose_of_objects,
+)
+from sec_lab.execution.perception import COLOURS, MINIMUM_PX, TABLE, Perceived, SeenThing, things_in
+from sec_lab.execution.relative_poses import Handling, handling
+from sec_lab.execution.skill import Rule, SceneError, Skill, Step, rules_of
 from sec_lab.learning import learn
-from sec_lab.recording import Recording
+from sec_lab.recording import Frame, Recording
+from sec_lab.segmentation.colour import colour_segments
 from sec_lab.worlds.katana.records import Camera, Floats, Move, Point
 
-_CLEARANCE_M = 0.045
-"""Between the tip and what it goes past: half a hand, and what perception may be off."""
-_OVER_M = 0.12
-"""Least height at which the tip passes over things."""
-_FREE_M_S = 0.3
-
-
-class SceneError(ValueError):
-    """Nothing can be done in the scene as it is seen; the message says why."""
-
-
-@dataclass(frozen=True)
-class Rule:
-    """A transition of the model (§2.10.5).
-
-    Parameters
-    ----------
-    column : int
-        In which it is reached.
-    pair : tuple of str
-        Whose relation changes.
-    change : str
-        Such as "NT".
-    """
-
-    column: int
-    pair: tuple[str, str]
-    change: str
-
-
-@dataclass(frozen=True, eq=False)
-class Skill:
-    """What was learned of a dual-object manipulation: the model, and the anchor points of its demonstrations.
-
-    Parameters
-    ----------
-    model : ActionModel
-    rules : tuple of Rule
-    prime, first, second : str
-        Prime mover, first and second touched object.
-    starts, touches, ends : Points
-        D2, D3 (relative, along the connection vector) and D8.
-    standoff_m : float
-        From the border of the first object to the tip as it touches: the lower quartile of the demonstrations, as
-        touching is perceived a little early where it is seen well.
-    press_m : float
-        By which the tip went beyond E₁ + Δ at the end of the second segment, mostly negative: the tip has a size (D7).
-    side_rad : float
-        Direction from the origin in which the tip touches, from the connection vector.
-    speed_m_s : float
-        Mean speed of the tip on the second segment.
-    contact_gap_m : float
-        Widest gap that was seen between first and second object while they stood touching in the end.
-    """
-
-    model: ActionModel
-    rules: tuple[Rule, ...]
-    prime: str
-    first: str
-    second: str
-    starts: Points
-    touches: Points
-    ends: Points
-    standoff_m: float
-    press_m: float
-    side_rad: float
-    speed_m_s: float
-    contact_gap_m: float
+__all__ = [
+    "Demonstrated",
+    "MacroError",
+    "Rule",
+    "SceneError",
+    "Skill",
+    "Step",
+    "check_scene",
+    "learn_skill",
+    "plan",
+    "rules_of",
+    "shifted",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,50 +60,16 @@ class Demonstrated:
     perceived : Perceived
     tip_m : (n, 3) float64
         Of the arm, from its own joints.
+    joints_rad : (n, 7) float64, optional
+        Angles of these joints, the two fingers last. Without them nothing is known of the hand: it then faces along the
+        connection vector, and its fingers stay as they are.
     """
 
     recording: Recording
     camera: Camera
     perceived: Perceived
     tip_m: Floats
-
-
-@dataclass(frozen=True)
-class Step:
-    """Moves of the arm that follow one rule.
-
-    Parameters
-    ----------
-    rule : Rule
-    moves : tuple of Move
-    heading_rad : float
-        Of the connection vector.
-    column_is_last : bool
-        Whether the model ends there.
-    """
-
-    rule: Rule
-    moves: tuple[Move, ...]
-    heading_rad: float
-    column_is_last: bool
-
-
-def rules_of(model: ActionModel) -> tuple[Rule, ...]:
-    """Rules of a model: its transitions between N, T and A, column after column.
-
-    Parameters
-    ----------
-    model : ActionModel
-    """
-    chain = model.chain
-    rules = []
-    for column in range(1, chain.relations.shape[1]):
-        for row, (one, other) in enumerate(chain.pairs):
-            before, after = (LETTER_OF[Relation(int(chain.relations[row, at]))] for at in (column - 1, column))
-            if before != after:
-                pair = (str(chain.names[int(one)]), str(chain.names[int(other)]))
-                rules.append(Rule(column, pair, before + after))
-    return tuple(rules)
+    joints_rad: Floats | None = None
 
 
 def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
@@ -169,26 +91,51 @@ def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
     chains = {name: one.perceived.chain for name, one in demonstrations.items() if one.perceived.chain is not None}
     model = learn(chains)
     rules = rules_of(model)
-    contacts = [rule for rule in rules if rule.change == "NT"]
-    if len(contacts) < 2:
-        raise ValueError(f"model: expected two transitions from N to T, got {len(contacts)}")
-    shared = set(contacts[0].pair) & set(contacts[1].pair)
-    if len(shared) != 1:
-        raise ValueError(f"model: expected one object in both transitions from N to T, got {sorted(shared)}")
-    (first,) = shared
-    (prime,) = set(contacts[0].pair) - shared
-    (second,) = set(contacts[1].pair) - shared
-    leaving = next(rule.column for rule in rules if rule.change == "TN" and prime in rule.pair)
-    rows = []
-    for name in chains:
-        one = demonstrations[name]
-        frames = dict(enumerate(model.key_frames[model.demonstrations.index(name)].tolist()))
-        seen_at = [frames[contacts[0].column - 1], frames[contacts[0].column], frames[contacts[1].column]]
-        if min(seen_at) < 0 or frames[leaving] < 0:
-            continue
-        rows.append(_measured(one, seen_at, frames[leaving], first, second))
-    if not rows:
+    frames = {
+        name: model.key_frames[place].tolist()
+        for place, name in enumerate(model.demonstrations)
+        if name in demonstrations
+    }
+    first_contact = next((rule for rule in rules if rule.change == "NT" and TABLE not in rule.pair), None)
+    if first_contact is None:
+        raise MacroError("model: expected two transitions from N to T, got 0")
+    n, t = first_contact.column - 1, first_contact.column
+    # The objects are measured where nothing hides them yet: just before the arm is first seen; and in the end.
+    pictures = {
+        name: _pictures(demonstrations[name], (max(at[n] - 1, 0), at[n], at[t], -1))
+        for name, at in frames.items()
+        if min(at[n], at[t]) >= 0
+    }
+    prime = identify_prime_mover([_difference(shots[1], shots[2]) for shots in pictures.values()])
+    first = identify_first_touched(rules, prime)[0]
+    second, meeting = identify_second_touched(rules, prime, first)
+    leaving = next((rule.column for rule in rules if rule.change == "TN" and set(rule.pair) == {prime, first}), None)
+    if leaving is None:
+        raise MacroError(f"model: expected a transition T→N of {prime!r} and {first!r}, got none")
+    ground = [rule.column for rule in rules if rule.change == "NT" and set(rule.pair) == {first, TABLE}]
+    whole = {name: at for name, at in frames.items() if min(at[n], at[t], at[meeting.column], at[leaving]) >= 0}
+    if not whole:
         raise ValueError("demonstrations: expected one with all key frames of the model, got none")
+    rows, shown = [], []
+    for name, at in whole.items():
+        one, seen_at = demonstrations[name], [at[n], at[t], at[meeting.column]]
+        before, end = (
+            {thing.name: thing for thing in things_in(shot, one.camera)}
+            for shot in pictures[name][:: len(pictures[name]) - 1]
+        )
+        hand = None
+        if one.joints_rad is not None and first in end:
+            hand = handling(
+                one.joints_rad,
+                one.tip_m,
+                (before[first], before[second], end[first]),
+                touches=at[t],
+                contact=at[meeting.column],
+                leaves=at[leaving],
+                set_down=at[ground[-1]] if ground and at[ground[-1]] >= 0 else None,
+            )
+            shown.append(hand)
+        rows.append(_measured(one, before[first], before[second], seen_at, at[leaving], hand))
     starts, tips, origins, vectors, standoffs, presses, ends, speeds = (
         list(column) for column in zip(*rows, strict=True)
     )
@@ -208,6 +155,8 @@ def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
         float(np.arctan2(middle[1], middle[0])),
         float(np.median(speeds)),
         max(one.perceived.last_gap_m(first, second) for one in demonstrations.values()),
+        pose_of_hand(shown),
+        pose_of_objects(shown, rules, first),
     )
 
 
@@ -231,45 +180,7 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
     SceneError
         If an object is missing, or they touch already.
     """
-    first, second = check_scene(skill, things)
-    found = intersections(first, second)
-    vector = connection_vector(first, second)
-    way = vector[:2] / np.linalg.norm(vector[:2])
-    facing = float(np.arctan2(way[1], way[0]))
-    # The tip stands off the border where the demonstrations touched: seen from the origin, on this side of it.
-    side = facing + skill.side_rad
-    outwards = np.array([np.cos(side), np.sin(side)])
-    border = border_distance(first.footprint_m, first.centre_m[:2], outwards)
-    touch = first.centre_m[:2] + (border + skill.standoff_m) * outwards
-    height = float(np.median(skill.touches.points_m[:, 2] + first.top_m / 2))
-    over = max(_OVER_M, *(thing.top_m + 0.05 for thing in (first, second)))
-    at, steps = touch, []
-    for rule in skill.rules:
-        moves: tuple[Move, ...]
-        if rule.change == "NT" and set(rule.pair) == {skill.prime, skill.first}:
-            outside = touch + _CLEARANCE_M * outwards
-            moves = (
-                Move(_at(outside, over), name="over", facing_rad=facing, speed_m_s=_FREE_M_S),
-                Move(_at(outside, height), name="down", speed_m_s=0.1),
-                Move(_at(touch, height), name="reach", speed_m_s=skill.speed_m_s),
-            )
-        elif rule.change == "NT" and set(rule.pair) == {skill.first, skill.second}:
-            at = found.E1_m + (segment_length(found) + skill.press_m) * way
-            moves = (Move(_at(at, height), name="bring", speed_m_s=skill.speed_m_s),)
-        elif rule.change == "TN" and skill.prime in rule.pair:
-            away = at + (_CLEARANCE_M + 0.01) * outwards
-            moves = (Move(_at(away, height), name="leave", speed_m_s=skill.speed_m_s),)
-            at = away
-        elif rule.change == "NA" and skill.prime in rule.pair:
-            moves = (
-                Move(_at(at, over), name="up", speed_m_s=0.1),
-                Move(home_m, name="home", speed_m_s=_FREE_M_S),
-            )
-        else:
-            # The prime mover comes into view on its way to the first object.
-            continue
-        steps.append(Step(rule, moves, facing, rule.column == skill.rules[-1].column))
-    return tuple(steps)
+    return macro(skill, *check_scene(skill, things), things, home_m=home_m).steps
 
 
 def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, SeenThing]:
@@ -302,22 +213,15 @@ def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, S
 
 
 def _measured(
-    one: Demonstrated, frames: Sequence[int], leaving: int, first: str, second: str
+    one: Demonstrated, red: SeenThing, green: SeenThing, frames: Sequence[int], leaving: int, hand: Handling | None
 ) -> tuple[Floats, Floats, Floats, Floats, float, float, Floats, float]:
     """What one demonstration says: where the tip was, and how far from the borders."""
     appears, touches, _ = frames
-    before = {}
-    for frame in one.recording:
-        # The objects are measured where nothing hides them yet: just before the arm is first seen.
-        if frame.index == max(appears - 1, 0):
-            before = {thing.name: thing for thing in things_in(frame, one.camera)}
-            break
-    red, green = before[first], before[second]
     vector = connection_vector(red, green)
-    tip = one.tip_m[touches]
+    tip = one.tip_m[touches] if hand is None else hand.tip_m
     outwards = tip[:2] - red.centre_m[:2]
-    outwards = outwards / np.linalg.norm(outwards)
-    border = border_distance(red.footprint_m, red.centre_m[:2], outwards)
+    outwards = outwards / max(float(np.linalg.norm(outwards)), 1e-9)
+    border = border_distance(red.footprint_m, red.centre_m[:2], outwards) if outwards.any() else 0.0
     standoff = float(np.linalg.norm(tip[:2] - red.centre_m[:2]) - border)
     farthest = max(in_frame(point, red.centre_m, vector)[0] for point in one.tip_m[touches:leaving])
     found = intersections(red, green)
@@ -329,11 +233,24 @@ def _measured(
     return one.tip_m[appears], tip, red.centre_m, vector, standoff, float(press), one.tip_m[-1], speed
 
 
+def _difference(before: Frame, after: Frame) -> PrimeMover:
+    """D1: difference image of the segments at two key frames."""
+    names = {label: colour.name for label, colour in enumerate(COLOURS, start=1)}
+    n, t = (colour_segments(frame.image, COLOURS, minimum_px=MINIMUM_PX, components="all") for frame in (before, after))
+    return prime_mover(n, t, names)
+
+
+def _pictures(one: Demonstrated, numbers: Sequence[int]) -> list[Frame]:
+    """Some frames of a demonstration, in one pass; −1 is the last."""
+    found: dict[int, Frame] = {}
+    for frame in one.recording:
+        if frame.index in numbers:
+            found[frame.index] = frame
+        found[-1] = frame
+    return [found[number] for number in numbers]
+
+
 def shifted(move: Move, by_m: Floats) -> Move:
     """The same move elsewhere."""
     x, y, z = (float(value) for value in np.asarray(move.to_m) + by_m)
     return replace(move, to_m=(x, y, z))
-
-
-def _at(point: Floats, height_m: float) -> Point:
-    return float(point[0]), float(point[1]), height_m

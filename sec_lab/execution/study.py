@@ -61,7 +61,11 @@ def skill_of(demonstrations: Iterable[Demonstration]) -> Skill:
     return learn_skill(
         {
             f"demonstration {number}": Demonstrated(
-                given.recording, given.scene.camera, perceive(given.recording, given.scene.camera), given.truth.tip_m
+                given.recording,
+                given.scene.camera,
+                perceive(given.recording, given.scene.camera),
+                given.truth.tip_m,
+                given.truth.joints_rad,
             )
             for number, given in enumerate(demonstrations, start=1)
         }
