@@ -24,7 +24,7 @@ from sec_lab.execution.anchors import PrimeMover, border_distance, connection_ve
 from sec_lab.execution.grips import FINGERS_BEYOND_M, Grip, System, coordinate_system, grip_of
 from sec_lab.execution.perception import SeenThing
 from sec_lab.execution.relative_poses import Hand, Handling, Placed, agreed_hand, agreed_placing
-from sec_lab.execution.skill import Rule, Skill, Step
+from sec_lab.execution.skill import Rule, Skill, Step, told
 from sec_lab.worlds.katana.records import TABLE, Floats, Move, Point
 
 INSTRUCTIONS = (
@@ -171,7 +171,7 @@ def first_segment(skill: Skill, system: System, rules: Sequence[Rule], grip: Gri
     grip : Grip or None
         Of what will be carried.
     """
-    over = max(OVER_M, *(thing.top_m + 0.05 for thing in (system.first, system.second)))
+    over = over_m((system.first, system.second, *system.others))
     if grip is None:
         touch, outwards, height = _touch(skill, system)
         outside = touch + CLEARANCE_M * outwards
@@ -318,7 +318,7 @@ def third_segment(
         Of what was carried.
     home_m : tuple of float
     """
-    over = max(OVER_M, *(thing.top_m + 0.05 for thing in (system.first, system.second)))
+    over = over_m((system.first, system.second, *system.others))
     if grip is None:
         _, outwards, height = _touch(skill, system)
         away = _pushed_to(skill, system) + (CLEARANCE_M + 0.01) * outwards
@@ -432,20 +432,41 @@ def allotted(skill: Skill) -> dict[Part, tuple[Rule, ...]]:
     return {part: tuple(rules) for part, rules in found.items()}
 
 
+def over_m(things: Sequence[SeenThing]) -> float:
+    """Height at which the tip passes over things.
+
+    Parameters
+    ----------
+    things : sequence of SeenThing
+    """
+    return max(OVER_M, *(thing.top_m + 0.05 for thing in things))
+
+
 def _touch(skill: Skill, system: System) -> tuple[Floats, Floats, float]:
     """Where the tip touches what it pushes, the way out from there, and the height."""
     # The tip stands off the border where the demonstrations touched: seen from the origin, on this side of it.
     side = system.heading_rad + skill.side_rad
     outwards = np.array([np.cos(side), np.sin(side)])
-    border = border_distance(system.first.footprint_m, system.first.centre_m[:2], outwards)
-    touch = system.first.centre_m[:2] + (border + skill.standoff_m) * outwards
-    return touch, outwards, float(np.median(skill.touches.points_m[:, 2] + system.first.top_m / 2))
+    centre, height = system.first.centre_m[:2], _push_height(skill, system)
+    border = border_distance(_border(system.first, height), centre, outwards)
+    return centre + (border + skill.standoff_m) * outwards, outwards, height
 
 
 def _pushed_to(skill: Skill, system: System) -> Floats:
-    found = intersections(system.first, system.second)
-    pushed: Floats = found.E1_m + (segment_length(found) + skill.press_m) * system.way
+    centre, border = system.first.centre_m[:2], _border(system.first, _push_height(skill, system))
+    back = centre - border_distance(border, centre, -system.way) * system.way
+    length = segment_length(intersections(system.first, system.second))
+    pushed: Floats = back + (length + skill.press_m) * system.way
     return pushed
+
+
+def _push_height(skill: Skill, system: System) -> float:
+    return float(np.median(skill.touches.points_m[:, 2] + system.first.top_m / 2))
+
+
+def _border(thing: SeenThing, height_m: float) -> Floats:
+    """What is narrower above is touched where the tip is, not at its base."""
+    return thing.footprint_m if thing.solid is None else thing.solid.section_m(height_m)
 
 
 def _reached(segment: Segment, skill: Skill) -> Rule:
@@ -487,7 +508,7 @@ def _results(skill: Skill, system: System, grip: Grip | None) -> dict[int, str]:
 
 
 def _told(rule: Rule) -> str:
-    return f"{{{', '.join(sorted(rule.pair))}}} {rule.change[0]}→{rule.change[1]} in column {rule.column + 1}"
+    return f"{told(rule)} in column {rule.column + 1}"
 
 
 def _at(point: Floats, height_m: float) -> Point:

@@ -17,18 +17,22 @@ from sec_lab.execution.anchors import (
     start_points,
     touching_points,
 )
+from sec_lab.execution.corridor import obstacle, swept
+from sec_lab.execution.enriched import Enriched
 from sec_lab.execution.macro import (
     MacroError,
     identify_first_touched,
     identify_prime_mover,
     identify_second_touched,
     macro,
+    over_m,
     pose_of_hand,
     pose_of_objects,
 )
-from sec_lab.execution.perception import COLOURS, MINIMUM_PX, TABLE, Perceived, SeenThing, things_in
+from sec_lab.execution.perception import COLOURS, CONTACT_M, MINIMUM_PX, TABLE, Perceived, SeenThing, things_in
 from sec_lab.execution.relative_poses import Handling, handling
-from sec_lab.execution.skill import Rule, SceneError, Skill, Step, rules_of
+from sec_lab.execution.skill import Rule, SceneError, Skill, Step, rules_of, told
+from sec_lab.execution.solids import gap_between
 from sec_lab.learning import learn
 from sec_lab.recording import Frame, Recording
 from sec_lab.segmentation.colour import colour_segments
@@ -46,7 +50,11 @@ __all__ = [
     "plan",
     "rules_of",
     "shifted",
+    "told",
 ]
+
+_LEAST_SEEN = 0.6
+"""A thing of which only what is above this share of its height is seen hovers, or stands too well hidden."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +79,32 @@ class Demonstrated:
     tip_m: Floats
     joints_rad: Floats | None = None
 
+    @property
+    def frames_per_second(self) -> float:
+        """Of the recording."""
+        return self.recording.frames_per_second or 20.0
 
-def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
+    def things_at(self, number: int) -> tuple[SeenThing, ...]:
+        """Things as they are seen in a frame.
+
+        Raises
+        ------
+        ValueError
+            If there is no such frame.
+        """
+        for frame in self.recording:
+            if frame.index == number:
+                return things_in(frame, self.camera)
+        raise ValueError(f"frame: expected one of the movie, got {number}")
+
+
+def learn_skill(demonstrations: Mapping[str, Demonstrated | Enriched]) -> Skill:
     """Learn the model (step 7) and read the anchor points off the key frames of all demonstrations (§2.10.3).
 
     Parameters
     ----------
-    demonstrations : mapping of str to Demonstrated
+    demonstrations : mapping of str to Demonstrated or Enriched
+        Enriched ones come from files (A.2).
 
     Returns
     -------
@@ -100,13 +127,8 @@ def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
     if first_contact is None:
         raise MacroError("model: expected two transitions from N to T, got 0")
     n, t = first_contact.column - 1, first_contact.column
-    # The objects are measured where nothing hides them yet: just before the arm is first seen; and in the end.
-    pictures = {
-        name: _pictures(demonstrations[name], (max(at[n] - 1, 0), at[n], at[t], -1))
-        for name, at in frames.items()
-        if min(at[n], at[t]) >= 0
-    }
-    prime = identify_prime_mover([_difference(shots[1], shots[2]) for shots in pictures.values()])
+    looks = {name: _looks(demonstrations[name], at[n], at[t]) for name, at in frames.items() if min(at[n], at[t]) >= 0}
+    prime = identify_prime_mover([change for _, _, change in looks.values()])
     first = identify_first_touched(rules, prime)[0]
     second, meeting = identify_second_touched(rules, prime, first)
     leaving = next((rule.column for rule in rules if rule.change == "TN" and set(rule.pair) == {prime, first}), None)
@@ -119,10 +141,7 @@ def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
     rows, shown = [], []
     for name, at in whole.items():
         one, seen_at = demonstrations[name], [at[n], at[t], at[meeting.column]]
-        before, end = (
-            {thing.name: thing for thing in things_in(shot, one.camera)}
-            for shot in pictures[name][:: len(pictures[name]) - 1]
-        )
+        before, end, _ = looks[name]
         hand = None
         if one.joints_rad is not None and first in end:
             hand = handling(
@@ -160,7 +179,7 @@ def learn_skill(demonstrations: Mapping[str, Demonstrated]) -> Skill:
     )
 
 
-def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[Step, ...]:
+def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point, again: bool = False) -> tuple[Step, ...]:
     """Motion for a scene: the rules of the model, one after the other, by vector addition (§2.10.5).
 
     Parameters
@@ -170,6 +189,8 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
         As the camera sees them.
     home_m : tuple of float
         Where the tip goes in the end.
+    again : bool, optional
+        After a failure: the objects may look as if they touched.
 
     Returns
     -------
@@ -178,42 +199,76 @@ def plan(skill: Skill, things: Sequence[SeenThing], *, home_m: Point) -> tuple[S
     Raises
     ------
     SceneError
-        If an object is missing, or they touch already.
+        If an object is missing, or they touch already, or something is in the way.
     """
-    return macro(skill, *check_scene(skill, things), things, home_m=home_m).steps
+    first, second = check_scene(skill, things, again=again)
+    steps = macro(skill, first, second, things, home_m=home_m).steps
+    _check_way(skill, steps, first, second, things)
+    return steps
 
 
-def check_scene(skill: Skill, things: Sequence[SeenThing]) -> tuple[SeenThing, SeenThing]:
+def check_scene(skill: Skill, things: Sequence[SeenThing], *, again: bool = False) -> tuple[SeenThing, SeenThing]:
     """First and second object of a scene, or one clear error.
 
     Parameters
     ----------
     skill : Skill
     things : sequence of SeenThing
+    again : bool, optional
+        See :func:`plan`.
 
     Raises
     ------
     SceneError
         If one is missing, there are two candidates, one is not on the table, or they touch already.
     """
-    from sec_lab.execution.perception import CONTACT_M, gap_m
-
     seen = {thing.name: thing for thing in things}
     for name in (skill.first, skill.second):
         if name not in seen:
             raise SceneError(f"scene: expected something that looks like {name!r}, got {sorted(seen)}")
         if seen[name].n_parts > 1:
             raise SceneError(f"scene: expected one candidate for {name!r}, got {seen[name].n_parts}")
-        if not 0.01 < seen[name].top_m < 0.2 or seen[name].bottom_m < -0.01:
-            raise SceneError(f"scene: expected {name!r} on the table, got its top at {seen[name].top_m:.3f} m")
+        top, bottom = seen[name].top_m, seen[name].bottom_m
+        if not 0.01 < top < 0.2 or not -0.01 < bottom < _LEAST_SEEN * top:
+            raise SceneError(f"scene: expected {name!r} on the table, got it from {bottom:.3f} to {top:.3f} m above it")
     first, second = seen[skill.first], seen[skill.second]
-    if gap_m(first.points_m, second.points_m) < CONTACT_M[0]:
+    if first.solid is None or second.solid is None:
+        raise ValueError("things: expected those of a whole look, with outlines, got some without")
+    if not again and gap_between(first.solid, second.solid) < CONTACT_M[0]:
         raise SceneError(f"scene: expected {skill.first!r} and {skill.second!r} apart, got them touching already")
     return first, second
 
 
+def _check_way(
+    skill: Skill, steps: Sequence[Step], first: SeenThing, second: SeenThing, things: Sequence[SeenThing]
+) -> None:
+    """Nothing if the way is free; otherwise a SceneError that names what is in it."""
+    others = [
+        (thing.name, thing.solid)
+        for thing in things
+        if thing.solid is not None and thing.name not in (first.name, second.name)
+    ]
+    moves = [move for step in steps for move in step.moves]
+    met = obstacle(moves, others, below_m=over_m(things))
+    if met:
+        raise SceneError(f"scene: expected a free way for the arm, got {met!r} in it")
+    if skill.hand.closes or first.solid is None:
+        # What is carried passes over everything.
+        return
+    length = segment_length(intersections(first, second))
+    vector = connection_vector(first, second)[:2]
+    met = swept(first.solid, length * vector / np.linalg.norm(vector), others)
+    if met:
+        raise SceneError(f"scene: expected a free way from {first.name!r} to {second.name!r}, got {met!r} in it")
+
+
 def _measured(
-    one: Demonstrated, red: SeenThing, green: SeenThing, frames: Sequence[int], leaving: int, hand: Handling | None
+    one: Demonstrated | Enriched,
+    red: SeenThing,
+    green: SeenThing,
+    frames: Sequence[int],
+    leaving: int,
+    hand: Handling | None,
 ) -> tuple[Floats, Floats, Floats, Floats, float, float, Floats, float]:
     """What one demonstration says: where the tip was, and how far from the borders."""
     appears, touches, _ = frames
@@ -228,26 +283,29 @@ def _measured(
     press = farthest - in_frame([*found.E1_m, 0.0], red.centre_m, vector)[0] - segment_length(found)
     moving = one.tip_m[touches:leaving]
     steps = np.linalg.norm(np.diff(moving, axis=0), axis=1)
-    fps = one.recording.frames_per_second or 20.0
-    speed = float(steps[steps > 1e-4].mean() * fps)
+    speed = float(steps[steps > 1e-4].mean() * one.frames_per_second)
     return one.tip_m[appears], tip, red.centre_m, vector, standoff, float(press), one.tip_m[-1], speed
 
 
-def _difference(before: Frame, after: Frame) -> PrimeMover:
-    """D1: difference image of the segments at two key frames."""
-    names = {label: colour.name for label, colour in enumerate(COLOURS, start=1)}
-    n, t = (colour_segments(frame.image, COLOURS, minimum_px=MINIMUM_PX, components="all") for frame in (before, after))
-    return prime_mover(n, t, names)
-
-
-def _pictures(one: Demonstrated, numbers: Sequence[int]) -> list[Frame]:
-    """Some frames of a demonstration, in one pass; −1 is the last."""
-    found: dict[int, Frame] = {}
-    for frame in one.recording:
-        if frame.index in numbers:
-            found[frame.index] = frame
-        found[-1] = frame
-    return [found[number] for number in numbers]
+def _looks(
+    one: Demonstrated | Enriched, n: int, t: int
+) -> tuple[dict[str, SeenThing], dict[str, SeenThing], PrimeMover]:
+    """Things before anything hides them (just before the arm is first seen) and in the end, and what changes (D1)."""
+    if isinstance(one, Enriched):
+        before, end, change = one.things_at(max(n - 1, 0)), one.things_at(len(one.tip_m) - 1), one.difference(n, t)
+    else:
+        found: dict[int, Frame] = {}
+        for frame in one.recording:
+            if frame.index in (max(n - 1, 0), n, t):
+                found[frame.index] = frame
+            found[-1] = frame
+        before, end = (things_in(found[number], one.camera) for number in (max(n - 1, 0), -1))
+        segments = [
+            colour_segments(found[number].image, COLOURS, minimum_px=MINIMUM_PX, components="all") for number in (n, t)
+        ]
+        names = {label: colour.name for label, colour in enumerate(COLOURS, start=1)}
+        change = prime_mover(segments[0], segments[1], names)
+    return {thing.name: thing for thing in before}, {thing.name: thing for thing in end}, change
 
 
 def shifted(move: Move, by_m: Floats) -> Move:

@@ -122,3 +122,8 @@ def rules_of(model: ActionModel) -> tuple[Rule, ...]:
                 pair = (str(chain.names[int(one)]), str(chain.names[int(other)]))
                 rules.append(Rule(column, pair, before + after))
     return tuple(rules)
+
+
+def told(rule: Rule) -> str:
+    """A rule in words, such as "{red box, robot arm} N→T"."""
+    return "{" + ", ".join(sorted(rule.pair)) + "} " + "→".join(rule.change)

@@ -1,17 +1,29 @@
-"""Studies of the execution: many random scenes, each once, as a table."""
+"""Studies of the execution: many random scenes, and planted failures in some of them, as tables."""
 
-import csv
-import io
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, fields
-from pathlib import Path
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from sec_lab.execution.loop import execute_skill
+import numpy as np
+
+from sec_lab.execution.loop import Outcome, execute_skill
 from sec_lab.execution.perception import perceive
 from sec_lab.execution.planning import Demonstrated, Skill, learn_skill
-from sec_lab.files import write_whole
+from sec_lab.recognition import rate
 from sec_lab.worlds.katana.demonstrations import Demonstration
+from sec_lab.worlds.katana.records import Fault, Scene, Thing
 from sec_lab.worlds.katana.scenes import random_scene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Failure = Literal["slips", "missed", "wrong object", "removed"]
+SEED, N_SCENES, N_PLANTED = 2014, 100, 12
+
+_MISSES_BY_M = 0.09
+_BINS_DEG = (0.0, 15.0, 30.0, 45.0)
 
 
 @dataclass(frozen=True)
@@ -33,8 +45,15 @@ class Trial:
     n_attempts : int
     first_failure : str
         Of the self-check; empty if there was none.
+    gave_up : str
+        Why there was no further attempt; empty after success.
+    gap_mm : float
+        Between the completed shapes, as it was seen in the end.
+    first_diagonal_deg, second_diagonal_deg : float
+        Between the connection vector and the nearest side of the first and of the second object, 45° along a diagonal;
+        0 for round things (truth).
     pushed_away_mm : float
-        How far the second object was moved (§2.10.5).
+        How far the second object was moved (§2.10.5; truth).
     simulated_s : float
     """
 
@@ -46,8 +65,45 @@ class Trial:
     touching: bool = False
     n_attempts: int = 0
     first_failure: str = ""
+    gave_up: str = ""
+    gap_mm: float = 0.0
+    first_diagonal_deg: float = 0.0
+    second_diagonal_deg: float = 0.0
     pushed_away_mm: float = 0.0
     simulated_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlantedTrial:
+    """One failure planted in a random scene.
+
+    Parameters
+    ----------
+    number : int
+        Of the scene.
+    kind : str
+    thing : str
+        Whom it happens to.
+    rule : str
+        At which it has to be recognised.
+    recognised_at : str
+        Rule of the first verdict of the first attempt that disagrees; empty if there was none.
+    why : str
+        What that verdict said.
+    n_attempts : int
+    accepted, touching : bool
+        The arm's own verdict and the truth after all attempts.
+    """
+
+    number: int
+    kind: str
+    thing: str
+    rule: str
+    recognised_at: str
+    why: str
+    n_attempts: int
+    accepted: bool
+    touching: bool
 
 
 def skill_of(demonstrations: Iterable[Demonstration]) -> Skill:
@@ -63,7 +119,7 @@ def skill_of(demonstrations: Iterable[Demonstration]) -> Skill:
             f"demonstration {number}": Demonstrated(
                 given.recording,
                 given.scene.camera,
-                perceive(given.recording, given.scene.camera),
+                perceive(given.recording, given.scene.camera, tip_m=given.truth.tip_m),
                 given.truth.tip_m,
                 given.truth.joints_rad,
             )
@@ -72,56 +128,274 @@ def skill_of(demonstrations: Iterable[Demonstration]) -> Skill:
     )
 
 
-def trials(skill: Skill, *, seed: int, numbers: Iterable[int]) -> Iterator[Trial]:
-    """Random scenes, one after the other.
+def trial(skill: Skill, *, seed: int, number: int) -> Trial:
+    """A push in one random scene.
 
     Parameters
     ----------
     skill : Skill
-    seed : int
-    numbers : iterable of int
-        Which scenes of the collection.
-
-    Yields
-    ------
-    Trial
+    seed, number : int
+        Of the scene.
     """
-    for number in numbers:
-        scene = random_scene(seed, number=number)
-        red, green = scene.things[:2]
-        try:
-            outcome = execute_skill(scene, skill)
-        except ValueError as error:
-            yield Trial(number, red.shape, len(scene.things), refused=str(error))
-            continue
-        poses = outcome.truth.poses[green.name]
-        moved = poses[-1][:2, 3] - poses[0][:2, 3]
-        failures = [f"{verdict.rule}: {verdict.why}" for verdict in outcome.verdicts if not verdict.agrees]
-        yield Trial(
+    scene = random_scene(seed, number=number)
+    red, green = scene.things[:2]
+    first_deg, second_deg = (_diagonal_deg(scene, one) for one in (red, green))
+    try:
+        done = execute_skill(scene, skill)
+    except ValueError as error:
+        return Trial(
             number,
             red.shape,
             len(scene.things),
-            "",
-            outcome.success,
-            bool(outcome.truth.touching(red.name, green.name)[-1]),
-            outcome.n_attempts,
-            failures[0] if failures else "",
-            round(float(1000 * (moved @ moved) ** 0.5), 1),
-            round(outcome.time_s, 2),
+            refused=str(error),
+            first_diagonal_deg=first_deg,
+            second_diagonal_deg=second_deg,
         )
+    poses = done.truth.poses[green.name]
+    moved = poses[-1][:2, 3] - poses[0][:2, 3]
+    failures = [f"{verdict.rule}: {verdict.why}" for verdict in done.verdicts if not verdict.agrees]
+    return Trial(
+        number,
+        red.shape,
+        len(scene.things),
+        "",
+        accepted=done.success,
+        touching=_touching(done, red, green),
+        n_attempts=done.n_attempts,
+        first_failure=failures[0] if failures else "",
+        gave_up=done.gave_up,
+        gap_mm=round(1000 * done.perceived.last_gap_m(skill.first, skill.second), 2),
+        first_diagonal_deg=first_deg,
+        second_diagonal_deg=second_deg,
+        pushed_away_mm=round(float(1000 * np.hypot(*moved)), 1),
+        simulated_s=round(done.time_s, 2),
+    )
 
 
-def write_trials(path: Path, found: Iterable[Trial]) -> None:
-    """Write trials as CSV, whole or not at all.
+def planted_trial(skill: Skill, kind: Failure, *, seed: int, number: int) -> PlantedTrial:
+    """A push in one random scene in which something goes wrong in the first attempt.
 
     Parameters
     ----------
-    path : Path
-    found : iterable of Trial
+    skill : Skill
+    kind : {"slips", "missed", "wrong object", "removed"}
+        The first object slips away half-way; the arm comes down 9 cm aside; it goes to the second object instead of the
+        first; somebody takes the first object away (or the second, in scenes of an odd number).
+    seed, number : int
+        Of the scene.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown, or the scene is refused.
     """
-    text = io.StringIO()
-    writer = csv.DictWriter(text, [field.name for field in fields(Trial)], lineterminator="\n")
-    writer.writeheader()
-    for trial in sorted(found, key=lambda trial: trial.number):
-        writer.writerow(asdict(trial))
-    write_whole(path, text.getvalue())
+    if kind not in get_args(Failure):
+        raise ValueError(f"kind: expected one of {get_args(Failure)}, got {kind!r}")
+    scene = random_scene(seed, number=number)
+    red, green = scene.things[:2]
+    touch = f"{{{', '.join(sorted((skill.first, skill.prime)))}}} N→T"
+    bring = f"{{{', '.join(sorted((skill.first, skill.second)))}}} N→T"
+    way = np.array(green.p_W_m[:2]) - np.array(red.p_W_m[:2])
+    aside = _MISSES_BY_M * np.array([-way[1], way[0]]) / np.hypot(*way) * (1 if number % 2 else -1)
+    taken = green if number % 2 else red
+    fault, thing, rule = {
+        "slips": (Fault("slips", "bring", red.name), red, bring),
+        "missed": (Fault("missed", "over", offset_m=(float(aside[0]), float(aside[1]))), red, touch),
+        "wrong object": (Fault("wrong object", "over", green.name, red.name), green, touch),
+        "removed": (Fault("removed", "bring", taken.name), taken, bring),
+    }[kind]
+    done = execute_skill(scene, skill, fault=fault)
+    wrong = [verdict for verdict in done.verdicts if verdict.attempt == 0 and not verdict.agrees]
+    return PlantedTrial(
+        number,
+        kind,
+        thing.name,
+        rule,
+        wrong[0].rule if wrong else "",
+        wrong[0].why if wrong else "",
+        done.n_attempts,
+        done.success,
+        _touching(done, red, green),
+    )
+
+
+def trials(skill: Skill, *, seed: int = SEED, n: int = N_SCENES, n_jobs: int = 1) -> "pd.DataFrame":
+    """Pushes in random scenes, one row each; see :class:`Trial`.
+
+    Parameters
+    ----------
+    skill : Skill
+    seed : int, optional
+    n : int, optional
+        How many scenes.
+    n_jobs : int, optional
+        How many at a time, as in :class:`joblib.Parallel`; the table does not depend on it.
+    """
+    return _table([partial(trial, skill, seed=seed, number=number) for number in range(n)], n_jobs=n_jobs)
+
+
+def planted_trials(skill: Skill, *, seed: int = SEED, n: int = N_PLANTED, n_jobs: int = 1) -> "pd.DataFrame":
+    """All kinds of failures in the first random scenes, one row each; see :class:`PlantedTrial`.
+
+    Parameters
+    ----------
+    skill : Skill
+    seed : int, optional
+    n : int, optional
+        In how many scenes.
+    n_jobs : int, optional
+        As for :func:`trials`.
+    """
+    kinds: tuple[Failure, ...] = get_args(Failure)
+    tasks = [partial(planted_trial, skill, kind, seed=seed, number=number) for number in range(n) for kind in kinds]
+    return _table(tasks, n_jobs=n_jobs)
+
+
+def scene_rates(table: "pd.DataFrame") -> "pd.DataFrame":
+    """Counts of :func:`trials`, each with its Wilson interval of 95 %.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        As it is made, or read by ``pandas.read_csv(..., keep_default_na=False)``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row each: end touching (refused ones count as not), the same by shape, refused, failed and recognised as such,
+        and among the executed ones a right verdict, accepted though apart, rejected though touching, one attempt.
+    """
+    done = table[table["refused"] == ""]
+    touching, accepted = done["touching"].astype(bool), done["accepted"].astype(bool)
+    counts = {
+        "touching in the end": (int(touching.sum()), len(table)),
+        **{
+            f"touching in the end: {shape}": (
+                int(touching[done["shape"] == shape].sum()),
+                int((table["shape"] == shape).sum()),
+            )
+            for shape in sorted(set(table["shape"]))
+        },
+        "refused": (len(table) - len(done), len(table)),
+        "touching, refused or recognised as a failure": (
+            len(table) - int((~touching & accepted).sum()),
+            len(table),
+        ),
+        "verdict right": (int((touching == accepted).sum()), len(done)),
+        "accepted though apart": (int((~touching & accepted).sum()), len(done)),
+        "rejected though touching": (int((touching & ~accepted).sum()), len(done)),
+        "in the first attempt": (int((touching & (done["n_attempts"] == 1)).sum()), len(table)),
+    }
+    return _rates(counts)
+
+
+def planted_rates(table: "pd.DataFrame") -> "pd.DataFrame":
+    """Counts of :func:`planted_trials` for each kind, with their Wilson intervals of 95 %.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        See :func:`scene_rates`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row each: recognised at its move, by kind and in all; touching after further attempts (of those in which
+        nothing was taken away); verdict right in the end.
+    """
+    right = table["recognised_at"] == table["rule"]
+    there = table[table["kind"] != "removed"]
+    counts = {
+        **{
+            f"recognised at its move: {kind}": (
+                int(right[table["kind"] == kind].sum()),
+                int((table["kind"] == kind).sum()),
+            )
+            for kind in dict.fromkeys(table["kind"])
+        },
+        "recognised at its move": (int(right.sum()), len(table)),
+        "touching after further attempts": (int(there["touching"].astype(bool).sum()), len(there)),
+        "verdict right in the end": (
+            int((table["touching"].astype(bool) == table["accepted"].astype(bool)).sum()),
+            len(table),
+        ),
+    }
+    return _rates(counts)
+
+
+def pushed_away(table: "pd.DataFrame") -> "pd.DataFrame":
+    """How far the second object is pushed away, by how diagonally it is met (§2.10.5).
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        See :func:`scene_rates`; only what ended in the first attempt counts, as further ones push again.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each range of the angle: number, median and largest way in mm.
+    """
+    import pandas as pd
+
+    once = table[(table["refused"] == "") & (table["n_attempts"] == 1) & table["touching"].astype(bool)]
+    rows = []
+    for low, high in pairwise(_BINS_DEG):
+        angle = once["second_diagonal_deg"]
+        way = once["pushed_away_mm"][(angle >= low) & ((angle < high) | (high == _BINS_DEG[-1]))]
+        rows.append(
+            {
+                "from_deg": low,
+                "to_deg": high,
+                "n": len(way),
+                "median_mm": round(float(way.median()), 1) if len(way) else float("nan"),
+                "largest_mm": round(float(way.max()), 1) if len(way) else float("nan"),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _rates(counts: dict[str, tuple[int, int]]) -> "pd.DataFrame":
+    import pandas as pd
+
+    rows = []
+    for what, (n_right, n) in counts.items():
+        if n:
+            found = rate(n_right, n)
+            rows.append(
+                {
+                    "what": what,
+                    "n": n_right,
+                    "of": n,
+                    "percent": round(found.percent, 1),
+                    "low_percent": round(found.low_percent, 1),
+                    "high_percent": round(found.high_percent, 1),
+                }
+            )
+    return pd.DataFrame(rows).set_index("what")
+
+
+def _table(tasks: "list[partial[Any]]", *, n_jobs: int) -> "pd.DataFrame":
+    import sys
+
+    import pandas as pd
+    from joblib import Parallel, delayed
+    from tqdm import tqdm
+
+    run = Parallel(n_jobs=n_jobs, return_as="generator")(delayed(task)() for task in tasks)
+    return pd.DataFrame(
+        [asdict(one) for one in tqdm(run, total=len(tasks), unit="scene", disable=not sys.stderr.isatty())]
+    )
+
+
+def _touching(done: Outcome, red: Thing, green: Thing) -> bool:
+    return bool(done.truth.touching(red.name, green.name)[-1])
+
+
+def _diagonal_deg(scene: Scene, thing: Thing) -> float:
+    """Angle between the way from the first to the second thing and the nearest side of a box; 0 for round things."""
+    if thing.shape != "box":
+        return 0.0
+    way = np.array(scene.things[1].p_W_m[:2]) - np.array(scene.things[0].p_W_m[:2])
+    turn = np.rad2deg(np.arctan2(way[1], way[0]) - thing.yaw_rad)
+    return round(float(abs((turn + 45) % 90 - 45)), 1)

@@ -32,6 +32,7 @@ _DENSITY_KG_M3 = 450.0
 _TABLE_FRICTION, _THING_FRICTION = 0.35, 0.5
 _GAINS = {"pan": (900.0, 50.0), "lift_2": (1500.0, 90.0), "lift_3": (900.0, 50.0), "lift_4": (400.0, 20.0)}
 _ROLL_GAINS, _FINGER_GAINS = (60.0, 3.0), (12.0, 0.6)
+_BALL_N_M = 5e3
 # What stops a ball that nobody pushes any more: the cloth of the table, which the contact model does not know.
 _ROLLING_N_M_S, _LEAST_ROLLING = 4e-3, 1e-6
 
@@ -191,12 +192,15 @@ def _add_thing(plant: "MultibodyPlant", thing: Thing) -> int:
     shape, inertia = _shape_and_inertia(thing)
     body = plant.AddRigidBody(thing.name, default_model_instance(), inertia)
     properties = ProximityProperties()
-    AddCompliantHydroelasticProperties(
-        resolution_hint=thing.size_m[0] / 3, hydroelastic_modulus=1e7, properties=properties
-    )
-    AddContactMaterial(
-        dissipation=20.0, friction=CoulombFriction(_THING_FRICTION, _THING_FRICTION), properties=properties
-    )
+    friction = CoulombFriction(_THING_FRICTION, _THING_FRICTION)
+    if thing.shape == "sphere":
+        # The mesh of an elastic ball has flat sides, on which it would come to rest; contact at a point keeps it round.
+        AddContactMaterial(dissipation=20.0, point_stiffness=_BALL_N_M, friction=friction, properties=properties)
+    else:
+        AddCompliantHydroelasticProperties(
+            resolution_hint=thing.size_m[0] / 3, hydroelastic_modulus=1e7, properties=properties
+        )
+        AddContactMaterial(dissipation=20.0, friction=friction, properties=properties)
     plant.RegisterCollisionGeometry(body, RigidTransform(), shape, thing.name, properties)
     colour: Any = np.array([*(part / 255 for part in thing.colour), 1.0])
     plant.RegisterVisualGeometry(body, RigidTransform(), shape, thing.name, colour)

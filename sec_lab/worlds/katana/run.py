@@ -192,9 +192,34 @@ class Run:
             raise ValueError("film: expected a run with one, got none")
         return View(self._eye.colour(self._context), self._eye.depth(self._context), self._start.camera)
 
-    def check(self, move: Move) -> None:
-        """Nothing, or UnreachableError with the reason; see :func:`~sec_lab.execution.motion.check_plan` for plans."""
-        self._path(move)
+    def check(self, *moves: Move) -> None:
+        """Nothing if the arm can make all moves, one after the other, from where it is now; the reason otherwise.
+
+        Parameters
+        ----------
+        *moves : Move
+
+        Raises
+        ------
+        UnreachableError
+            It names the move.
+        """
+        q = self._q
+        for number, move in enumerate(moves):
+            try:
+                path = path_of(q, move, step_s=STEP_S).q_rad
+            except UnreachableError as error:
+                raise UnreachableError(f"move {number} ({move.name}): {error}") from error
+            q = path[-1] if len(path) else q
+
+    def tips_since(self, first: int) -> tuple[Floats, ...]:
+        """Where the joints' own sensors said that the tip was, frame by frame from a number on; (3,) float64 each.
+
+        Parameters
+        ----------
+        first : int
+        """
+        return tuple(moment.tip for moment in self._moments[first:])
 
     def move(self, move: Move) -> None:
         """Make one move, filming, and rest a little.
