@@ -1,16 +1,27 @@
-"""Grips (§2.11): where the fingers take a thing in a scene and where they put it, from relative poses as learned."""
+"""Where the hand takes hold of a thing and where it brings it: by its side, or in its grip (§2.10.4, §2.11)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from sec_lab.execution.anchors import border_distance, connection_vector, coordinate_origin
+from sec_lab.execution.anchors import (
+    border_distance,
+    connection_vector,
+    coordinate_origin,
+    intersections,
+    segment_length,
+)
 from sec_lab.execution.perception import ARM, SeenThing
 from sec_lab.execution.relative_poses import HALF_RAD, QUARTER_RAD, Placed, turn_of
 from sec_lab.execution.skill import SceneError, Skill
 from sec_lab.worlds.katana.kinematics import UnreachableError, roll_for_facing
 from sec_lab.worlds.katana.records import TABLE, Floats
+
+CLEARANCE_M = 0.045
+"""Between the tip and what it goes past: half a hand, and what perception may be off."""
+OVER_M = 0.12
+"""Least height at which the tip passes over things."""
 
 FINGERS_BEYOND_M = 0.012
 """How far the fingers reach beyond the tip (table of facts)."""
@@ -142,6 +153,65 @@ def grip_of(skill: Skill, system: System) -> Grip:
             else f"scene: expected a grip that fits both ends of the way of {first.name!r}, got none"
         )
     return min(grips, key=_effort)
+
+
+def over_m(things: Sequence[SeenThing]) -> float:
+    """Height at which the tip passes over things.
+
+    Parameters
+    ----------
+    things : sequence of SeenThing
+    """
+    return max(OVER_M, *(thing.top_m + 0.05 for thing in things))
+
+
+def pushing_touch(skill: Skill, system: System) -> tuple[Floats, Floats, float]:
+    """Where the tip touches what it pushes, the way out from there, and the height.
+
+    Parameters
+    ----------
+    skill : Skill
+    system : System
+
+    Returns
+    -------
+    touch_m, outwards : (2,) float64
+    height_m : float
+    """
+    # The tip stands off the border where the demonstrations touched: seen from the origin, on this side of it.
+    side = system.heading_rad + skill.side_rad
+    outwards = np.array([np.cos(side), np.sin(side)])
+    centre, height = system.first.centre_m[:2], _push_height(skill, system)
+    border = border_distance(_border(system.first, height), centre, outwards)
+    return centre + (border + skill.standoff_m) * outwards, outwards, height
+
+
+def pushed_to(skill: Skill, system: System) -> Floats:
+    """Where the tip is after a push: Δ and what the tip takes itself along the connection vector (D6, D7).
+
+    Parameters
+    ----------
+    skill : Skill
+    system : System
+
+    Returns
+    -------
+    (2,) float64
+    """
+    centre, border = system.first.centre_m[:2], _border(system.first, _push_height(skill, system))
+    back = centre - border_distance(border, centre, -system.way) * system.way
+    length = segment_length(intersections(system.first, system.second))
+    pushed: Floats = back + (length + skill.press_m) * system.way
+    return pushed
+
+
+def _push_height(skill: Skill, system: System) -> float:
+    return float(np.median(skill.touches.points_m[:, 2] + system.first.top_m / 2))
+
+
+def _border(thing: SeenThing, height_m: float) -> Floats:
+    """What is narrower above is touched where the tip is, not at its base."""
+    return thing.footprint_m if thing.solid is None else thing.solid.section_m(height_m)
 
 
 def _put(placed: Placed, system: System, second_turn: float | None) -> tuple[Floats, Floats]:

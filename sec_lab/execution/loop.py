@@ -16,7 +16,7 @@ from sec_lab.recording import Recording
 from sec_lab.worlds.katana.records import Fault, Move, Scene, Truth
 from sec_lab.worlds.katana.run import FRAMES_PER_SECOND
 
-_NUDGE_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.003, 0.02, 6
+_NUDGE_M, _TOUCH_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.003, 0.0005, 0.02, 6
 _PUSHED_M = 0.001
 """Who moves by this was touched: the second object's motion proves that the first has reached it."""
 _LOOSE_M, _MOST_OFF_M = 0.0005, 0.002
@@ -130,7 +130,7 @@ def execute_skill(
             why = _do(run, step, watcher, seen, skill)
             perceived = watcher.perceived()
             if not why and frozenset(step.rule.pair) == {skill.first, skill.second}:
-                pressed = _pressed(perceived, skill)
+                pressed = skill.contact_gap_m if skill.hand.closes else _pressed(perceived, skill)
             if not why and step.column_is_last:
                 why = loose(perceived, skill, pressed_m=pressed)
             verdicts.append(Verdict(attempt, told(step.rule), len(watcher), not why, why))
@@ -239,12 +239,17 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
         perceived = _once_still(run, watcher, seen, skill)
         why = agreement(perceived.observation, skill, step.rule.column)
         missing = why.startswith(_told(pair) + ":")
-        # A gap that looks like none may be one of half a millimetre; what moves was touched.
-        unsure = not why and pair == {skill.first, skill.second} and _pressed(perceived, skill) is None
-        if nudge == _MOST_NUDGES or step.rule.change != "NT" or not way.any() or not (missing or unsure):
-            break
         gap = perceived.last_gap_m(*step.rule.pair)
-        further_m += _NUDGE_M + (max(0.0, min(gap, _MOST_FURTHER_M)) if skill.prime not in pair else 0.0)
+        # A gap that looks like none may be one of half a millimetre; what moves was touched. What is held is not
+        # pressed on, as it would spring back when it is let go: it comes as close as in the demonstrations.
+        apart = gap > skill.contact_gap_m if skill.hand.closes else _pressed(perceived, skill) is None
+        unsure = not why and pair == {skill.first, skill.second} and apart
+        may_go_on = nudge < _MOST_NUDGES and step.rule.change == "NT" and way.any()
+        if not may_go_on or not (missing or unsure):
+            break
+        further_m += (_TOUCH_M if skill.hand.closes else _NUDGE_M) + (
+            max(0.0, min(gap, _MOST_FURTHER_M)) if skill.prime not in pair else 0.0
+        )
         moves = (shifted(step.moves[-1], further_m * way),)
     return why
 

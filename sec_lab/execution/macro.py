@@ -20,8 +20,19 @@ from typing import Literal
 
 import numpy as np
 
-from sec_lab.execution.anchors import PrimeMover, border_distance, connection_vector, intersections, segment_length
-from sec_lab.execution.grips import FINGERS_BEYOND_M, Grip, System, coordinate_system, grip_of
+from sec_lab.execution.anchors import PrimeMover, connection_vector, intersections, segment_length
+from sec_lab.execution.grips import (
+    CLEARANCE_M,
+    FINGERS_BEYOND_M,
+    OVER_M,
+    Grip,
+    System,
+    coordinate_system,
+    grip_of,
+    over_m,
+    pushed_to,
+    pushing_touch,
+)
 from sec_lab.execution.perception import SeenThing
 from sec_lab.execution.relative_poses import Hand, Handling, Placed, agreed_hand, agreed_placing
 from sec_lab.execution.skill import Rule, Skill, Step, told
@@ -38,11 +49,6 @@ INSTRUCTIONS = (
     "Define third motion segment (home).",
 )
 """As the thesis has them; with the sixth goes: "(For pushing do this by cross-sectioning with object borders)."."""
-
-CLEARANCE_M = 0.045
-"""Between the tip and what it goes past: half a hand, and what perception may be off."""
-OVER_M = 0.12
-"""Least height at which the tip passes over things."""
 
 _ABOVE_M = 0.03
 """Between the fingers and the top of what they have let go of."""
@@ -173,7 +179,7 @@ def first_segment(skill: Skill, system: System, rules: Sequence[Rule], grip: Gri
     """
     over = over_m((system.first, system.second, *system.others))
     if grip is None:
-        touch, outwards, height = _touch(skill, system)
+        touch, outwards, height = pushing_touch(skill, system)
         outside = touch + CLEARANCE_M * outwards
         facing = system.heading_rad + skill.hand.facing_rad
         return Segment(
@@ -255,10 +261,10 @@ def second_segment(skill: Skill, system: System, rules: Sequence[Rule], grip: Gr
         Of what is carried.
     """
     if grip is None:
-        _, _, height = _touch(skill, system)
+        _, _, height = pushing_touch(skill, system)
         return (
             Segment(
-                tuple(rules), (Move(_at(_pushed_to(skill, system), height), name="bring", speed_m_s=skill.speed_m_s),)
+                tuple(rules), (Move(_at(pushed_to(skill, system), height), name="bring", speed_m_s=skill.speed_m_s),)
             ),
         )
     assert skill.placed is not None
@@ -320,8 +326,8 @@ def third_segment(
     """
     over = over_m((system.first, system.second, *system.others))
     if grip is None:
-        _, outwards, height = _touch(skill, system)
-        away = _pushed_to(skill, system) + (CLEARANCE_M + 0.01) * outwards
+        _, outwards, height = pushing_touch(skill, system)
+        away = pushed_to(skill, system) + (CLEARANCE_M + 0.01) * outwards
         leave: tuple[Move, ...] = (Move(_at(away, height), skill.hand.after, "leave", None, skill.speed_m_s),)
     else:
         away = grip.put_m[:2]
@@ -417,11 +423,11 @@ def allotted(skill: Skill) -> dict[Part, tuple[Rule, ...]]:
         elif pair == {skill.first, skill.ground} and rule.change in ("NT", "TN"):
             part = "lift" if rule.change == "TN" else "ground"
         if part is None:
-            raise MacroError(f"model: no instruction covers {_told(rule)}")
+            raise MacroError(f"rule: expected one that moves follow from, got {_told(rule)}")
         # Whether what is put down meets the ground or the second object first is open.
         place = _ORDER.index("ground" if part == "bring" else part)
         if place < reached or (found[part] and part not in ("appear", "leave")):
-            raise MacroError(f"model: no instruction covers {_told(rule)} at this time")
+            raise MacroError(f"rule: expected one that moves follow from at this time, got {_told(rule)}")
         reached = place
         found[part].append(rule)
     missing = [part for part in ("touch", "bring", "part") if not found[part]]
@@ -430,43 +436,6 @@ def allotted(skill: Skill) -> dict[Part, tuple[Rule, ...]]:
     if found["lift"] and not skill.hand.closes:
         raise MacroError(f"model: {_told(found['lift'][0])}, but the fingers do not close in the demonstrations")
     return {part: tuple(rules) for part, rules in found.items()}
-
-
-def over_m(things: Sequence[SeenThing]) -> float:
-    """Height at which the tip passes over things.
-
-    Parameters
-    ----------
-    things : sequence of SeenThing
-    """
-    return max(OVER_M, *(thing.top_m + 0.05 for thing in things))
-
-
-def _touch(skill: Skill, system: System) -> tuple[Floats, Floats, float]:
-    """Where the tip touches what it pushes, the way out from there, and the height."""
-    # The tip stands off the border where the demonstrations touched: seen from the origin, on this side of it.
-    side = system.heading_rad + skill.side_rad
-    outwards = np.array([np.cos(side), np.sin(side)])
-    centre, height = system.first.centre_m[:2], _push_height(skill, system)
-    border = border_distance(_border(system.first, height), centre, outwards)
-    return centre + (border + skill.standoff_m) * outwards, outwards, height
-
-
-def _pushed_to(skill: Skill, system: System) -> Floats:
-    centre, border = system.first.centre_m[:2], _border(system.first, _push_height(skill, system))
-    back = centre - border_distance(border, centre, -system.way) * system.way
-    length = segment_length(intersections(system.first, system.second))
-    pushed: Floats = back + (length + skill.press_m) * system.way
-    return pushed
-
-
-def _push_height(skill: Skill, system: System) -> float:
-    return float(np.median(skill.touches.points_m[:, 2] + system.first.top_m / 2))
-
-
-def _border(thing: SeenThing, height_m: float) -> Floats:
-    """What is narrower above is touched where the tip is, not at its base."""
-    return thing.footprint_m if thing.solid is None else thing.solid.section_m(height_m)
 
 
 def _reached(segment: Segment, skill: Skill) -> Rule:

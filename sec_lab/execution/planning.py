@@ -19,13 +19,13 @@ from sec_lab.execution.anchors import (
 )
 from sec_lab.execution.corridor import obstacle, swept
 from sec_lab.execution.enriched import Enriched
+from sec_lab.execution.grips import over_m
 from sec_lab.execution.macro import (
     MacroError,
     identify_first_touched,
     identify_prime_mover,
     identify_second_touched,
     macro,
-    over_m,
     pose_of_hand,
     pose_of_objects,
 )
