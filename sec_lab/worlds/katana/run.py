@@ -99,7 +99,13 @@ class Run:
         self._film = Film((scene.camera.height, scene.camera.width), FRAMES_PER_SECOND, keep=watched)
         self._labels = labels and film
         self._owner_of_geometry = _owners(self._bench)
-        parts = [(geometry, name) for geometry, name in self._owner_of_geometry.items() if name != TABLE]
+        inspector = self._bench.graph.model_inspector()
+        parts = [
+            (geometry, name)
+            for geometry, name in self._owner_of_geometry.items()
+            # The fingers' pads lie on the fingers: what touches them presses on them.
+            if name != TABLE and "pad_" not in inspector.GetName(geometry)
+        ]
         self._pairs = [
             (one, other)
             for place, (one, name) in enumerate(parts)
