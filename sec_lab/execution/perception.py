@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
-from sec_lab.execution.solids import Solid, follow, gap_between, gap_to_points
+from sec_lab.execution.solids import Solid, follow, gap_between, gap_to_points, raised
 from sec_lab.execution.things import ARM, COLOURS, TABLE, SeenThing, named_things, rays_of, things_in
 from sec_lab.observation import Observation
 from sec_lab.recording import Frame, Recording
@@ -249,13 +249,20 @@ class Watcher:
         if thing.solid is None:
             solid = self._solids[thing.name]
             # What has not changed in the picture has not moved.
+            lift = self._lift(thing)
             if last is None or not np.array_equal(last.points_m, thing.points_m):
-                solid = follow(solid, thing.points_m)
-            centre = np.array([*solid.centre_m, thing.top_m / 2])
-            thing = replace(thing, solid=solid, centre_m=centre, footprint_m=solid.section_m())
-        assert thing.solid is not None
+                solid = follow(solid, thing.points_m - np.array([0.0, 0.0, lift]))
+            self._solids[thing.name] = solid
+            middle = thing.top_m - solid.top_m / 2 if lift else thing.top_m / 2
+            centre = np.array([*solid.centre_m, middle])
+            return replace(thing, solid=raised(solid, lift), centre_m=centre, footprint_m=solid.section_m())
         self._solids[thing.name] = thing.solid
         return thing
+
+    def _lift(self, thing: SeenThing) -> float:
+        """How much higher than at first its top is; nothing as long as it counts as touching the table."""
+        lift = thing.top_m - float(np.median(self._heights[thing.name]))
+        return lift if lift > TABLE_CONTACT_M[0] else 0.0
 
     def _is_hidden(self, last: SeenThing) -> bool:
         n = len(last.points_m)

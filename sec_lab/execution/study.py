@@ -122,6 +122,7 @@ def skill_of(demonstrations: Iterable[Demonstration]) -> Skill:
                 given.scene.camera,
                 perceive(given.recording, given.scene.camera, tip_m=given.truth.tip_m),
                 given.truth.tip_m,
+                given.truth.joints_rad,
             )
             for number, given in enumerate(demonstrations, start=1)
         }
