@@ -23,6 +23,9 @@ _ROBUST_M = 0.001
 _LOST_M = 0.0015
 _LEAST_POINTS = 25
 _HEIGHTS = 24
+STANDING_M = 0.004
+"""Tops are known to a few millimetres; and so near above something a thing is let go."""
+
 _RIM = 48
 
 
@@ -44,6 +47,8 @@ class Solid:
         a prism.
     error_m : float
         Root mean square distance of what was seen from this.
+    base_m : float, optional
+        How high above the table it ends below; above 0 if it is held, or stands on something.
     """
 
     centre_m: Floats
@@ -52,6 +57,7 @@ class Solid:
     corners_m: Floats
     profile: Floats
     error_m: float
+    base_m: float = 0.0
     _normals: Floats = field(init=False, repr=False)
     _offsets: Floats = field(init=False, repr=False)
 
@@ -140,13 +146,39 @@ def follow(solid: Solid, points_m: Floats) -> Solid:
     return found
 
 
+def raised(solid: Solid, by_m: float) -> Solid:
+    """The same solid, higher above the table.
+
+    Parameters
+    ----------
+    solid : Solid
+    by_m : float
+    """
+    return replace(solid, top_m=solid.top_m + by_m, base_m=solid.base_m + by_m) if by_m else solid
+
+
 def gap_between(one: Solid, other: Solid) -> float:
-    """Horizontal distance between two solids at the height where it is least, in metres; below zero if they overlap.
+    """Distance between two solids, in metres; below zero if they overlap.
+
+    Of two that stand on the table it is the horizontal one at the height where it is least. If one is above the other,
+    the vertical one adds to it; what hangs less than :data:`STANDING_M` above another counts as standing on it.
 
     Parameters
     ----------
     one, other : Solid
     """
+    level = _level_gap(_grounded(one), _grounded(other))
+    above = max(one.base_m - other.top_m, other.base_m - one.top_m)
+    if above <= -STANDING_M:
+        return level
+    return float(np.hypot(max(level, 0.0), max(above - STANDING_M, 0.0)))
+
+
+def _grounded(solid: Solid) -> Solid:
+    return raised(solid, -solid.base_m)
+
+
+def _level_gap(one: Solid, other: Solid) -> float:
     top = min(one.top_m, other.top_m)
     heights = np.linspace(0, top, _HEIGHTS)
     if one.is_round and other.is_round:
@@ -168,10 +200,10 @@ def gap_to_points(solid: Solid, points_m: Floats) -> float:
     """
     if not len(points_m):
         return float(np.inf)
-    above = np.maximum(points_m[:, 2] - solid.top_m, 0.0)
+    above = np.maximum(np.maximum(points_m[:, 2] - solid.top_m, solid.base_m - points_m[:, 2]), 0.0)
     if solid.is_round:
         away = np.linalg.norm(points_m[:, :2] - solid.centre_m, axis=1)
-        level = away - solid.radius_m(np.clip(points_m[:, 2], 0.0, solid.top_m))
+        level = away - solid.radius_m(np.clip(points_m[:, 2], solid.base_m, solid.top_m) - solid.base_m)
     else:
         reach = np.linalg.norm(solid.corners_m, axis=1).max()
         rough = np.linalg.norm(points_m[:, :2] - solid.centre_m, axis=1) - reach

@@ -15,18 +15,16 @@ import numpy as np
 from sec_lab.action_model import ActionModel
 from sec_lab.codes import WORD_OF, Relation
 from sec_lab.event_chain import EventChain
+from sec_lab.graphml.keyed import DATA, EDGE, GRAPH, KEY, NAMESPACE, NODE, UNNAMED, Keys, data_text, key_lines
 from sec_lab.graphml.markup import (
-    attribute,
     check,
     check_attributes,
-    content,
     finite_number,
     local_name,
     shown,
     whole_number,
     writable,
 )
-from sec_lab.graphml.standard import NAMESPACE
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -34,7 +32,6 @@ if TYPE_CHECKING:
 MODEL_KEY = "demonstrations"
 """Data that only the document of a model has; its key comes first."""
 
-_KEY, _DATA, _GRAPH, _NODE, _EDGE = (f"{{{NAMESPACE}}}{name}" for name in ("key", "data", "graph", "node", "edge"))
 _TYPE_OF: Mapping[str, Mapping[str, str]] = {
     "graphml": {MODEL_KEY: "string", "unseen_names": "string"},
     "graph": {"key_frame": "long", "column_weight": "double"},
@@ -47,7 +44,7 @@ _PARTS = ("names", "roles", "key_frames", "positions", "position_unit")
 
 def is_model(child: "Element") -> bool:
     """Whether the first child of a standard GraphML document shows that it is a model."""
-    return child.tag == _KEY and child.get("attr.name") == MODEL_KEY
+    return child.tag == KEY and child.get("attr.name") == MODEL_KEY
 
 
 def to_text(model: ActionModel) -> str:
@@ -71,25 +68,21 @@ def to_text(model: ActionModel) -> str:
     for name in (*model.demonstrations, *(name or "" for name in unseen.values())):
         writable(name, what="name")
     lines = ["<?xml version='1.0' encoding='UTF-8'?>", f'<graphml xmlns="{NAMESPACE}">']
-    for scope, types in _TYPE_OF.items():
-        lines += [
-            f'  <key id="{scope}_{name}" for="{scope}" attr.name="{name}" attr.type="{kind}"/>'
-            for name, kind in types.items()
-        ]
-    lines.append(f"  {_data('graphml', MODEL_KEY, json.dumps(said))}")
+    lines += key_lines(_TYPE_OF)
+    lines.append(f"  {data_text('graphml', MODEL_KEY, json.dumps(said))}")
     if unseen:
-        lines.append(f"  {_data('graphml', 'unseen_names', json.dumps(unseen))}")
+        lines.append(f"  {data_text('graphml', 'unseen_names', json.dumps(unseen))}")
     columns = zip(chain.key_frames.tolist(), model.column_weights.tolist(), chain.relations.T.tolist(), strict=True)
     for frame, weight, column in columns:
         lines += [
             f'  <graph id="column_{frame}" edgedefault="undirected">',
-            f"    {_data('graph', 'key_frame', str(frame))}",
-            f"    {_data('graph', 'column_weight', repr(weight))}",
+            f"    {data_text('graph', 'key_frame', str(frame))}",
+            f"    {data_text('graph', 'column_weight', repr(weight))}",
             *(f'    <node id="{segment}">{_name_data(chain, segment)}</node>' for segment in segments),
         ]
         rows = zip(chain.pairs.tolist(), column, model.row_weights.tolist(), strict=True)
         for (source, target), relation, row_weight in rows:
-            data = _data("edge", "relation", WORD_OF[Relation(relation)]) + _data(
+            data = data_text("edge", "relation", WORD_OF[Relation(relation)]) + data_text(
                 "edge", "row_weight", repr(row_weight)
             )
             lines.append(f'    <edge source="{source}" target="{target}">{data}</edge>')
@@ -109,11 +102,11 @@ def from_elements(root: "Element", children: "Iterator[Element]") -> ActionModel
     reader = _Reader()
     columns: list[_Column] = []
     for element in children:
-        if element.tag == _KEY:
-            reader.declare(element)
-        elif element.tag == _DATA:
+        if element.tag == KEY:
+            reader.keys.declare(element)
+        elif element.tag == DATA:
             reader.read_document_data(element)
-        elif element.tag == _GRAPH:
+        elif element.tag == GRAPH:
             columns.append(reader.column(element))
         else:
             raise ValueError(f"expected <key>, <data> or <graph>, got <{local_name(element.tag)}>")
@@ -128,7 +121,7 @@ def from_elements(root: "Element", children: "Iterator[Element]") -> ActionModel
     used = {segment for pair in first.pairs for segment in pair}
     if used != first.names.keys():
         raise ValueError(f"expected edges at every node, got none at {min(first.names.keys() ^ used)}")
-    names = {segment: name for segment, name in first.names.items() if name is not _UNNAMED}
+    names = {segment: name for segment, name in first.names.items() if name is not UNNAMED}
     chain = EventChain(
         np.array([column.relations for column in columns]).T,
         first.pairs,
@@ -136,9 +129,6 @@ def from_elements(root: "Element", children: "Iterator[Element]") -> ActionModel
         cast(dict[int, str | None], names | reader.unseen),
     )
     return reader.model(chain, first.row_weights, [column.weight for column in columns])
-
-
-_UNNAMED = object()
 
 
 @dataclass(frozen=True)
@@ -155,38 +145,12 @@ class _Column:
 class _Reader:
     """What has been read so far of one document."""
 
-    keys: dict[str, tuple[str, str]] = field(default_factory=dict)
+    keys: Keys = field(default_factory=lambda: Keys(_TYPE_OF, "a model"))
     said: dict[str, Any] | None = None
     unseen: dict[int, str | None] = field(default_factory=dict)
 
-    def declare(self, element: "Element") -> None:
-        check(element, required=("id", "for", "attr.name"), optional=("attr.type",))
-        key, scope, name = (element.attrib[what] for what in ("id", "for", "attr.name"))
-        if name not in _TYPE_OF.get(scope, {}):
-            raise ValueError(f"<key>: expected data of a model, got {shown(name)} for {shown(scope)}")
-        if key in self.keys:
-            raise ValueError(f"<key>: expected each id once, got {shown(key)} twice")
-        self.keys[key] = scope, name
-
-    def name_of(self, element: "Element", scope: str) -> str:
-        check(element, required=("key",), text=True)
-        declared = self.keys.get(element.attrib["key"])
-        if declared is None or declared[0] != scope:
-            raise ValueError(f"<data>: expected a key declared for {scope!r}, got {shown(element.attrib['key'])}")
-        return declared[1]
-
-    def data(self, element: "Element", scope: str) -> dict[str, str]:
-        values: dict[str, str] = {}
-        for child in element:
-            if child.tag == _DATA:
-                name = self.name_of(child, scope)
-                if name in values:
-                    raise ValueError(f"<{scope}>: expected {name!r} once, got it twice")
-                values[name] = child.text or ""
-        return values
-
     def read_document_data(self, element: "Element") -> None:
-        name, text = self.name_of(element, "graphml"), element.text or ""
+        name, text = self.keys.name_of(element, scope="graphml"), element.text or ""
         try:
             value = json.loads(text, parse_constant=_refuse)
         except (ValueError, RecursionError) as error:
@@ -201,25 +165,25 @@ class _Reader:
             self.unseen = {whole_number(label, what=name): said for label, said in value.items()}
 
     def column(self, element: "Element") -> _Column:
-        check(element, required=("edgedefault",), optional=("id",), children=(_DATA, _NODE, _EDGE))
+        check(element, required=("edgedefault",), optional=("id",), children=(DATA, NODE, EDGE))
         if element.attrib["edgedefault"] != "undirected":
             raise ValueError(f"<graph>: expected undirected edges, got {shown(element.attrib['edgedefault'])}")
-        data = self.data(element, "graph")
+        data = self.keys.data(element, scope="graph")
         _expect(data, _TYPE_OF["graph"], what="<graph>")
         names: dict[int, object] = {}
         pairs: list[tuple[int, int]] = []
         relations: list[Relation] = []
         weights: list[float] = []
         for child in element:
-            if child.tag == _NODE:
+            if child.tag == NODE:
                 segment, name = self.node(child)
                 if segment in names:
                     raise ValueError(f"node {segment}: expected it once in a column, got it twice")
                 names[segment] = name
-            elif child.tag == _EDGE:
-                check(child, required=("source", "target"), optional=("id",), children=(_DATA,))
+            elif child.tag == EDGE:
+                check(child, required=("source", "target"), optional=("id",), children=(DATA,))
                 source, target = (whole_number(child.attrib[end], what=f"edge {end}") for end in ("source", "target"))
-                values = self.data(child, "edge")
+                values = self.keys.data(child, scope="edge")
                 _expect(values, _TYPE_OF["edge"], what=f"edge {(source, target)}")
                 word = values["relation"]
                 if word not in _RELATION_OF:
@@ -234,11 +198,11 @@ class _Reader:
         return _Column(frame, weight, names, pairs, relations, weights)
 
     def node(self, element: "Element") -> tuple[int, object]:
-        check(element, required=("id",), children=(_DATA,))
+        check(element, required=("id",), children=(DATA,))
         segment = whole_number(element.attrib["id"], what="node id")
-        data = self.data(element, "node")
+        data = self.keys.data(element, scope="node")
         if "fragment" not in data:
-            return segment, data.get("name", _UNNAMED)
+            return segment, data.get("name", UNNAMED)
         if data["fragment"] != "true" or "name" in data:
             raise ValueError(f"node {segment}: expected a fragment that is true and has no name, got {data}")
         return segment, None
@@ -281,8 +245,4 @@ def _name_data(chain: EventChain, segment: int) -> str:
     if segment not in chain.names:
         return ""
     name = chain.names[segment]
-    return _data("node", "fragment", "true") if name is None else _data("node", "name", name)
-
-
-def _data(scope: str, name: str, value: str) -> str:
-    return f"<data key={attribute(f'{scope}_{name}', what='key')}>{content(value, what=f'{name} of a {scope}')}</data>"
+    return data_text("node", "fragment", "true") if name is None else data_text("node", "name", name)

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, cast
 
 from sec_lab.codes import WORD_OF
 from sec_lab.graphml.assembly import MOST_RELATIONS, Edge, Node, assemble, relation_of
+from sec_lab.graphml.keyed import DATA, EDGE, GRAPH, KEY, NAMESPACE, NODE, UNNAMED, Keys, data_text, key_lines
 from sec_lab.graphml.markup import (
-    attribute,
     check,
     check_attributes,
-    content,
     finite_number,
     local_name,
     shown,
@@ -30,10 +29,8 @@ from sec_lab.scene_graph import SceneGraph
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-NAMESPACE = "http://graphml.graphdrawing.org/xmlns"
 ROOT = f"{{{NAMESPACE}}}graphml"
 
-_KEY, _DATA, _GRAPH, _NODE, _EDGE = (f"{{{NAMESPACE}}}{name}" for name in ("key", "data", "graph", "node", "edge"))
 _AXES = ("x", "y", "z")
 _TYPE_OF: Mapping[str, Mapping[str, str]] = {
     "graphml": {"unseen_names": "string"},
@@ -41,7 +38,6 @@ _TYPE_OF: Mapping[str, Mapping[str, str]] = {
     "node": {"name": "string", "fragment": "boolean", "type": "string", "x": "double", "y": "double", "z": "double"},
     "edge": {"relation": "string"},
 }
-_UNNAMED = object()
 
 
 def from_elements(root: "Element", children: "Iterator[Element]") -> Observation:
@@ -58,11 +54,11 @@ def from_elements(root: "Element", children: "Iterator[Element]") -> Observation
     frames: list[int] = []
     units: set[str] = set()
     for element in children:
-        if element.tag == _KEY:
-            reader.declare(element)
-        elif element.tag == _DATA:
+        if element.tag == KEY:
+            reader.keys.declare(element)
+        elif element.tag == DATA:
             reader.read_unseen_names(element)
-        elif element.tag == _GRAPH:
+        elif element.tag == GRAPH:
             frame, unit, graph = reader.graph(element)
             frames.append(frame)
             units.add(unit)
@@ -85,21 +81,17 @@ def to_text(observation: Observation) -> str:
     seen = {segment for graph in observation.graphs if graph is not None for segment in graph.segments.tolist()}
     unseen = {str(segment): name for segment, name in observation.names.items() if segment not in seen}
     lines = ["<?xml version='1.0' encoding='UTF-8'?>", f'<graphml xmlns="{NAMESPACE}">']
-    for scope, types in _TYPE_OF.items():
-        lines += [
-            f'  <key id="{_id(scope, name)}" for="{scope}" attr.name="{name}" attr.type="{kind}"/>'
-            for name, kind in types.items()
-        ]
+    lines += key_lines(_TYPE_OF)
     if unseen:
         for segment, name in unseen.items():
             writable(name or "", what=f"name of segment {segment}")
-        lines.append(f"  {_data('graphml', 'unseen_names', json.dumps(unseen))}")
+        lines.append(f"  {data_text('graphml', 'unseen_names', json.dumps(unseen))}")
     for graph, frame in zip(observation.graphs, observation.key_frames.tolist(), strict=True):
         lines += [
             f'  <graph id="key_frame_{frame}" edgedefault="undirected">',
-            f"    {_data('graph', 'key_frame', str(frame))}",
-            f"    {_data('graph', 'recorded', 'false' if graph is None else 'true')}",
-            f"    {_data('graph', 'position_unit', observation.position_unit)}",
+            f"    {data_text('graph', 'key_frame', str(frame))}",
+            f"    {data_text('graph', 'recorded', 'false' if graph is None else 'true')}",
+            f"    {data_text('graph', 'position_unit', observation.position_unit)}",
         ]
         if graph is not None:
             lines += [*_node_lines(graph, observation), *_edge_lines(graph)]
@@ -112,39 +104,12 @@ class _Reader:
     """What has been read so far of one document."""
 
     room: int
-    keys: dict[str, tuple[str, str]] = field(default_factory=dict)
+    keys: Keys = field(default_factory=lambda: Keys(_TYPE_OF, "an event chain"))
     stated: dict[int, object] = field(default_factory=dict)
     unseen: dict[int, str | None] = field(default_factory=dict)
 
-    def declare(self, element: "Element") -> None:
-        check(element, required=("id", "for", "attr.name"), optional=("attr.type",))
-        key, scope, name = (element.attrib[what] for what in ("id", "for", "attr.name"))
-        if name not in _TYPE_OF.get(scope, {}):
-            raise ValueError(f"<key>: expected data of an event chain, got {shown(name)} for {shown(scope)}")
-        if key in self.keys:
-            raise ValueError(f"<key>: expected each id once, got {shown(key)} twice")
-        self.keys[key] = scope, name
-
-    def data(self, element: "Element", *, scope: str) -> dict[str, str]:
-        """Data of one element by name."""
-        values: dict[str, str] = {}
-        for child in element:
-            if child.tag == _DATA:
-                name = self.name_of(child, scope=scope)
-                if name in values:
-                    raise ValueError(f"<{scope}>: expected {name!r} once, got it twice")
-                values[name] = child.text or ""
-        return values
-
-    def name_of(self, element: "Element", *, scope: str) -> str:
-        check(element, required=("key",), text=True)
-        declared = self.keys.get(element.attrib["key"])
-        if declared is None or declared[0] != scope:
-            raise ValueError(f"<data>: expected a key declared for {scope!r}, got {shown(element.attrib['key'])}")
-        return declared[1]
-
     def read_unseen_names(self, element: "Element") -> None:
-        self.name_of(element, scope="graphml")
+        self.keys.name_of(element, scope="graphml")
         try:
             pairs = json.loads(element.text or "", object_pairs_hook=tuple)
         except (ValueError, RecursionError) as error:
@@ -159,17 +124,17 @@ class _Reader:
 
     def graph(self, element: "Element") -> tuple[int, str, SceneGraph | None]:
         """Key frame, position unit and scene graph of a ``<graph>``."""
-        check(element, required=("edgedefault",), optional=("id",), children=(_DATA, _NODE, _EDGE))
+        check(element, required=("edgedefault",), optional=("id",), children=(DATA, NODE, EDGE))
         if element.attrib["edgedefault"] != "undirected":
             raise ValueError(f"<graph>: expected undirected edges, got {shown(element.attrib['edgedefault'])}")
-        data = self.data(element, scope="graph")
+        data = self.keys.data(element, scope="graph")
         for name in _TYPE_OF["graph"]:
             if name not in data:
                 raise ValueError(f"<graph>: expected data {name!r}, got {sorted(data)}")
         frame = whole_number(data["key_frame"], what="key_frame")
         try:
-            nodes = [self.node(child) for child in element if child.tag == _NODE]
-            edges = [self.edge(child) for child in element if child.tag == _EDGE]
+            nodes = [self.node(child) for child in element if child.tag == NODE]
+            edges = [self.edge(child) for child in element if child.tag == EDGE]
             if not _truth(data["recorded"], what="recorded"):
                 if nodes or edges:
                     raise ValueError("recorded: expected true of a graph with nodes or edges, got false")
@@ -181,15 +146,15 @@ class _Reader:
         return frame, data["position_unit"], graph
 
     def node(self, element: "Element") -> Node:
-        check(element, required=("id",), children=(_DATA,))
+        check(element, required=("id",), children=(DATA,))
         segment = whole_number(element.attrib["id"], what="node id")
-        data = self.data(element, scope="node")
+        data = self.keys.data(element, scope="node")
         axes = tuple(axis for axis in _AXES if axis in data)
         if axes not in ((), _AXES[:2], _AXES):
             raise ValueError(f"node {segment}: expected x, y and perhaps z, got {', '.join(axes)}")
-        name: object = data.get("name", _UNNAMED)
+        name: object = data.get("name", UNNAMED)
         if "fragment" in data and _truth(data["fragment"], what=f"node {segment}, fragment"):
-            if name is not _UNNAMED:
+            if name is not UNNAMED:
                 raise ValueError(f"node {segment}: expected no name of a fragment, got {shown(data['name'])}")
             name = None
         if self.stated.setdefault(segment, name) != name:
@@ -198,9 +163,9 @@ class _Reader:
         return Node(segment, position, data.get("type"))
 
     def edge(self, element: "Element") -> Edge:
-        check(element, required=("source", "target"), optional=("id",), children=(_DATA,))
+        check(element, required=("source", "target"), optional=("id",), children=(DATA,))
         source, target = (whole_number(element.attrib[end], what=f"edge {end}") for end in ("source", "target"))
-        data = self.data(element, scope="edge")
+        data = self.keys.data(element, scope="edge")
         if "relation" not in data:
             raise ValueError(f"edge {(source, target)}: expected data 'relation', got none")
         return Edge(source, target, relation_of(data["relation"]))
@@ -210,7 +175,7 @@ class _Reader:
         twice = self.unseen.keys() & self.stated.keys()
         if twice:
             raise ValueError(f"unseen_names: expected segments that are in no graph, got {min(twice)}")
-        seen = {segment: cast(str | None, name) for segment, name in self.stated.items() if name is not _UNNAMED}
+        seen = {segment: cast(str | None, name) for segment, name in self.stated.items() if name is not UNNAMED}
         return seen | self.unseen
 
 
@@ -219,27 +184,19 @@ def _node_lines(graph: SceneGraph, observation: Observation) -> Iterator[str]:
         data = []
         if segment in observation.names:
             name = observation.names[segment]
-            data.append(_data("node", "fragment", "true") if name is None else _data("node", "name", name))
+            data.append(data_text("node", "fragment", "true") if name is None else data_text("node", "name", name))
         if graph.types is not None:
-            data.append(_data("node", "type", graph.types[i]))
+            data.append(data_text("node", "type", graph.types[i]))
         if graph.positions is not None:
             position = zip(_AXES, graph.positions[i].tolist(), strict=False)
-            data += [_data("node", axis, repr(value)) for axis, value in position]
+            data += [data_text("node", axis, repr(value)) for axis, value in position]
         yield f'    <node id="{segment}">{"".join(data)}</node>'
 
 
 def _edge_lines(graph: SceneGraph) -> Iterator[str]:
     for source, target, relation in graph.edges():
-        data = _data("edge", "relation", WORD_OF[relation])
+        data = data_text("edge", "relation", WORD_OF[relation])
         yield f'    <edge source="{source}" target="{target}">{data}</edge>'
-
-
-def _data(scope: str, name: str, value: str) -> str:
-    return f"<data key={attribute(_id(scope, name), what='key')}>{content(value, what=f'{name} of a {scope}')}</data>"
-
-
-def _id(scope: str, name: str) -> str:
-    return f"{scope}_{name}"
 
 
 def _truth(text: str, *, what: str) -> bool:

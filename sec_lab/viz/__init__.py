@@ -4,6 +4,14 @@ Functions draw into axes that are given, or make a figure of their own, without 
 a notebook. One style (:mod:`sec_lab.viz.style`) serves all of them.
 """
 
+from sec_lab.viz.anchors import draw_anchor_spread as draw_anchor_spread
+from sec_lab.viz.anchors import draw_demonstrated as draw_demonstrated
+from sec_lab.viz.anchors import draw_planned as draw_planned
+from sec_lab.viz.anchors import draw_prime_mover as draw_prime_mover
+from sec_lab.viz.anchors import picture_axes as picture_axes
+from sec_lab.viz.arm import ArmRecording as ArmRecording
+from sec_lab.viz.arm import LiveArm as LiveArm
+from sec_lab.viz.arm import arm_recording as arm_recording
 from sec_lab.viz.by_model import draw_by_model as draw_by_model
 from sec_lab.viz.by_model import draw_over_time as draw_over_time
 from sec_lab.viz.cells import relation_name as relation_name
@@ -34,3 +42,8 @@ from sec_lab.viz.table import draw_similarity_table as draw_similarity_table
 from sec_lab.viz.timeline import draw_events as draw_events
 from sec_lab.viz.verdicts import Finding as Finding
 from sec_lab.viz.verdicts import verdict_table as verdict_table
+from sec_lab.viz.watched import colour_labels as colour_labels
+from sec_lab.viz.watched import draw_seen as draw_seen
+from sec_lab.viz.watched import draw_strips as draw_strips
+from sec_lab.viz.watched import frames_at as frames_at
+from sec_lab.viz.watched import start_of_last_attempt as start_of_last_attempt

@@ -1,8 +1,116 @@
-"""The arm in three dimensions: a recording that plays inside a page, with everything it needs in it."""
+"""The arm in three dimensions: recordings that play inside a page with all they need in it, and a live view."""
 
-from collections.abc import Sequence
+import base64
+import gzip
+import html
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.resources import files
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from sec_lab.worlds.katana import Move, Run, Scene
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
+
+_FRAMES_PER_SECOND = 20.0
+_EYE_M, _TARGET_M = (0.66, -0.40, 0.36), (0.18, 0.0, 0.10)
+_LIGHTS = (("AmbientLight", 1.6), ("FillLight", 1.2))
+_ARM_COLOUR = (0.07, 0.075, 0.09, 1.0)
+"""Of the arm without its tip: were it as black as the real one, its shapes could not be told apart."""
+_LINKS = ("base", "pan", "upper_arm", "forearm", "wrist", "roll")
+_HEIGHT_PX = 460
+_LOOPBACK = "127.0.0.1"
+
+_UNPACK = """<!DOCTYPE html><meta charset="utf-8"><title>{title}</title><body><p>Unpacking …</p><script>
+fetch("data:application/gzip;base64,{packed}")
+  .then(answer => new Response(answer.body.pipeThrough(new DecompressionStream("gzip"))).text())
+  .then(page => {{ document.open(); document.write(page); document.close(); }});
+</script></body>"""
+
+
+@dataclass(frozen=True)
+class ArmRecording:
+    """A recording that shows itself in a notebook, to be played, scrubbed and looked at from all sides.
+
+    Parameters
+    ----------
+    page : str
+        HTML without any address in need of a network.
+    title : str
+    """
+
+    page: str
+    title: str
+
+    def __repr__(self) -> str:
+        return f"3D recording: {self.title}"
+
+    def _repr_html_(self) -> str:
+        # Packed it is half as large; no date goes into it, so that equal recordings are equal.
+        packed = base64.b64encode(gzip.compress(self.page.encode(), mtime=0)).decode()
+        document = _UNPACK.format(title=html.escape(self.title), packed=packed)
+        return (
+            f'<iframe srcdoc="{html.escape(document)}" title="{html.escape(self.title)}" '
+            f'style="width: 100%; height: {_HEIGHT_PX}px; border: 1px solid #d9dce1" loading="lazy"></iframe>'
+        )
+
+
+class LiveArm:
+    """A live view of the arm; only programs on this machine can open it.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Raises
+    ------
+    UnreachableError
+        If the arm cannot be at the start.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._meshcat = _meshcat()
+        self._run = Run(scene, film=False, meshcat=self._meshcat)
+        _brighten(self._meshcat)
+
+    @property
+    def url(self) -> str:
+        """Where the view is, on this machine."""
+        return f"http://{_LOOPBACK}:{self._meshcat.port()}"
+
+    def move(self, *moves: Move) -> "LiveArm":
+        """Let the arm make moves, at the speed of the simulation.
+
+        Parameters
+        ----------
+        moves : Move
+
+        Raises
+        ------
+        UnreachableError
+            If a move is out of reach; those before it are made.
+        """
+        for move in moves:
+            self._run.move(move)
+        self._meshcat.Flush()
+        return self
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+        return self._run.scene
+
+    def __repr__(self) -> str:
+        return f"live 3D view at {self.url}"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.url}" style="width: 100%; height: {_HEIGHT_PX}px; border: 0"></iframe>'
 
 
 def arm_page(scene: Scene, moves: Sequence[Move]) -> str:
@@ -16,21 +124,75 @@ def arm_page(scene: Scene, moves: Sequence[Move]) -> str:
     Returns
     -------
     str
-        HTML without any address in need of a network; about 2 MB.
+        HTML without any address in need of a network; less than 3 MB for a push. Equal moves give equal pages.
 
     Raises
     ------
     UnreachableError
         If a move is out of reach.
     """
-    from pydrake.geometry import Meshcat
-
-    meshcat = Meshcat()
-    meshcat.SetProperty("/Background", "visible", value=False)
+    meshcat = _meshcat()
     run = Run(scene, film=False, meshcat=meshcat)
-    meshcat.StartRecording(frames_per_second=20.0, set_visualizations_while_recording=False)
+    _brighten(meshcat)
+    meshcat.StartRecording(frames_per_second=_FRAMES_PER_SECOND, set_visualizations_while_recording=False)
     for move in moves:
         run.move(move)
     meshcat.StopRecording()
     meshcat.PublishRecording()
-    return str(meshcat.StaticHtml())
+    bar = files("sec_lab.viz").joinpath("arm.html").read_text(encoding="utf-8")
+    return str(meshcat.StaticHtml()).replace("</body>", f"{bar}</body>")
+
+
+def arm_recording(scene: Scene, moves: Sequence[Move], *, title: str) -> ArmRecording:
+    """The moves of the arm for a notebook, see :func:`arm_page`.
+
+    Parameters
+    ----------
+    scene : Scene
+    moves : sequence of Move
+    title : str
+        What is shown, for those who cannot see it.
+
+    Raises
+    ------
+    UnreachableError
+        If a move is out of reach.
+    """
+    return ArmRecording(arm_page(scene, moves), title)
+
+
+def _meshcat() -> "Meshcat":
+    """A viewer that looks at the workplace and listens on this machine only."""
+    from pydrake.geometry import Meshcat, MeshcatParams
+
+    with _quiet():
+        # An empty port lets the system choose one.
+        meshcat = Meshcat(MeshcatParams(host=_LOOPBACK, show_stats_plot=False))
+    for path in ("/Background", "/Grid", "/Axes"):
+        meshcat.SetProperty(path, "visible", value=False)
+    for light, strength in _LIGHTS:
+        meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", value=strength)
+    eye: Any = np.array(_EYE_M)
+    target: Any = np.array(_TARGET_M)
+    meshcat.SetCameraPose(eye, target)
+    return meshcat
+
+
+def _brighten(meshcat: "Meshcat") -> None:
+    shapes = [f"{shape}{number}" for shape in ("Box", "Cylinder") for number in ("", *(f"_{n}" for n in range(1, 6)))]
+    for link, shape in product(_LINKS, shapes):
+        path = f"/drake/visualizer/katana/{link}/katana/{shape}"
+        if meshcat.HasPath(path):
+            meshcat.SetProperty(path, "color", list(_ARM_COLOUR))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without Drake's message of where it listens, which is another one each time."""
+    log = logging.getLogger("drake")
+    level = log.level
+    log.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        log.setLevel(level)

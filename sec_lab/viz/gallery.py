@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from sec_lab.codes import Relation
@@ -21,7 +22,7 @@ _BAR_IN = 0.75
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One picture: a frame, a label image, or a map of disparities; with a scene graph if there is one.
+    """One picture: a frame, a label image, or a map of disparities or ranges; with a scene graph if there is one.
 
     Parameters
     ----------
@@ -35,7 +36,13 @@ class Panel:
     graph: SceneGraph | None = None
 
 
-def draw_gallery(rows: Sequence[Sequence[Panel]], *, columns: Sequence[str], names: Sequence[str] = ()) -> Figure:
+def draw_gallery(
+    rows: Sequence[Sequence[Panel]],
+    *,
+    columns: Sequence[str],
+    names: Sequence[str] = (),
+    measure: str = "disparity in pixels",
+) -> Figure:
     """Draw pictures of equal size as wide as the page.
 
     Parameters
@@ -46,11 +53,13 @@ def draw_gallery(rows: Sequence[Sequence[Panel]], *, columns: Sequence[str], nam
         Titles of the columns.
     names : sequence of str, optional
         Names of the rows, written upright at their left.
+    measure : str, optional
+        What the maps of floats measure, for the colour bar.
 
     Returns
     -------
     matplotlib.figure.Figure
-        With a legend of the edges, and a colour bar that all maps of disparity share.
+        With a legend of the edges, and a colour bar that all maps share.
 
     Raises
     ------
@@ -101,8 +110,8 @@ def draw_gallery(rows: Sequence[Sequence[Panel]], *, columns: Sequence[str], nam
         bar_in = PAGE_WIDTH_IN - right_in + 0.12
         bar_ax = axes_at(figure, left_in=bar_in, top_in=_TITLE_IN, width_in=0.14, height_in=high_in)
         maps = [image for ax in figure.axes for image in ax.images if image.get_gid() == "disparity"]
-        bar = figure.colorbar(maps[0], cax=bar_ax)
-        bar.set_label("disparity in pixels", fontsize=SMALL_PT, color=SOFT)
+        bar = figure.colorbar(maps[0], cax=bar_ax, ticks=MaxNLocator(4, steps=[1, 2, 5, 10]))
+        bar.set_label(measure, fontsize=SMALL_PT, color=SOFT)
         bar.ax.tick_params(labelsize=SMALL_PT, colors=SOFT, length=2)
         bar.outline.set_visible(False)
     if relations:

@@ -51,6 +51,8 @@ class Bench:
         out.
     arm : MultibodyPlant
         The arm alone, for its inverse dynamics.
+    gear : MultibodyConstraintId
+        Of the gripper's one motor, which turns both fingers alike.
     """
 
     diagram: "Diagram"
@@ -58,6 +60,7 @@ class Bench:
     graph: "SceneGraph"
     owner_of: dict[int, str]
     arm: "MultibodyPlant"
+    gear: Any
 
 
 def build(scene: Scene, *, meshcat: "Meshcat | None" = None, render: bool = True) -> Bench:
@@ -85,6 +88,7 @@ def build(scene: Scene, *, meshcat: "Meshcat | None" = None, render: bool = True
     owner_of |= {int(plant.GetBodyByName(name).index()): ARM for name in TIP_BODIES}
     for thing in scene.things:
         owner_of[_add_thing(plant, thing)] = thing.name
+    gear = plant.AddCouplerConstraint(*(plant.GetJointByName(name) for name in FINGERS), gear_ratio=1.0)
     if render:
         graph.AddRenderer(_RENDERER, _renderer())
     plant.Finalize()
@@ -95,7 +99,7 @@ def build(scene: Scene, *, meshcat: "Meshcat | None" = None, render: bool = True
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, graph, meshcat)
     _let_arm_alone(plant, graph)
-    return Bench(builder.Build(), plant, graph, owner_of, arm_alone())
+    return Bench(builder.Build(), plant, graph, owner_of, arm_alone(), gear)
 
 
 class Eye:

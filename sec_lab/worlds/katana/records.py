@@ -288,6 +288,8 @@ class Truth:
         Label of each pixel; None if it was not asked for.
     names : mapping of int to str, optional
         Names of the labels.
+    joints_rad : (n, 7) float64, optional
+        Of the arm's five joints and the two fingers, from their own sensors; None in recordings that lack it.
     """
 
     contacts: Mapping[tuple[str, str], NDArray[np.bool_]]
@@ -296,6 +298,7 @@ class Truth:
     poses: Mapping[str, Floats]
     labels: NDArray[np.uint8] | None = None
     names: Mapping[int, str] = field(default_factory=dict)
+    joints_rad: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.tip_m)
@@ -307,6 +310,8 @@ class Truth:
         ]
         if self.labels is not None:
             arrays.append(("labels", self.labels, (n, *self.labels.shape[1:])))
+        if self.joints_rad is not None:
+            arrays.append(("joints_rad", self.joints_rad, (n, 7)))
         for name, array, expected in arrays:
             if array.shape != expected:
                 raise ValueError(f"{name}: expected shape {expected}, got {array.shape}")

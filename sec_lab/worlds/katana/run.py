@@ -30,6 +30,7 @@ _SLIP_M, _SLIP_WEIGHTS = 0.06, 2.0
 @dataclass(frozen=True, eq=False)
 class _Moment:
     contacts: frozenset[tuple[str, str]]
+    joints: Floats
     tip: Floats
     wanted: Floats
     poses: dict[str, Floats]
@@ -91,12 +92,20 @@ class Run:
             self._place(thing.name, _pose(thing))
         q: Any = self._q
         plant.SetPositions(self._plant_context, self._katana, q)
+        # Until the gripper is told to move, each finger is held where it is: by what holds it, not by the gear.
+        plant.SetConstraintActiveStatus(self._plant_context, self._bench.gear, status=False)
         self._simulator = Simulator(self._bench.diagram, self._context)
         self._eye = Eye(self._bench, scene.camera) if film else None
         self._film = Film((scene.camera.height, scene.camera.width), FRAMES_PER_SECOND, keep=watched)
         self._labels = labels and film
         self._owner_of_geometry = _owners(self._bench)
-        parts = [(geometry, name) for geometry, name in self._owner_of_geometry.items() if name != TABLE]
+        inspector = self._bench.graph.model_inspector()
+        parts = [
+            (geometry, name)
+            for geometry, name in self._owner_of_geometry.items()
+            # The fingers' pads lie on the fingers: what touches them presses on them.
+            if name != TABLE and "pad_" not in inspector.GetName(geometry)
+        ]
         self._pairs = [
             (one, other)
             for place, (one, name) in enumerate(parts)
@@ -159,6 +168,7 @@ class Run:
             },
             self._film.labels() if self._labels else None,
             {} if self._eye is None else self._eye.names,
+            np.array([moment.joints for moment in self._moments]),
         )
 
     @property
@@ -232,6 +242,8 @@ class Run:
         path = self._path(replace(move, to_m=(x, y, z)))
         self._offset = offset
         self._was_low = move.to_m[2] < LOW_M and bool(offset.any())
+        if move.gripper is not None:
+            self._bench.plant.SetConstraintActiveStatus(self._plant_context, self._bench.gear, status=True)
         if fault is not None:
             self._fault = None
         self._follow(path, fault)
@@ -299,15 +311,16 @@ class Run:
         plant.get_actuation_input_port().FixValue(self._plant_context, torque)
 
     def _measured(self) -> Floats:
-        return np.asarray(self._bench.plant.GetPositions(self._plant_context, self._katana))
+        return np.array(self._bench.plant.GetPositions(self._plant_context, self._katana))
 
     def _look(self) -> None:
         if self._eye is not None:
             labels = self._eye.labels(self._context) if self._labels else None
             self._film.add(self._eye.colour(self._context), self._eye.depth(self._context), labels)
-        tip = tip_position(self._measured()[:5])
+        joints = self._measured()
+        tip = tip_position(joints[:5])
         wanted = tip_position(self._q[:5]) if self._wanted is None else self._wanted
-        self._moments.append(_Moment(self._touching(), tip, wanted, self._poses()))
+        self._moments.append(_Moment(self._touching(), joints, tip, wanted, self._poses()))
 
     def _poses(self) -> dict[str, Floats]:
         plant = self._bench.plant
