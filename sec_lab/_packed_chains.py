@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from sec_lab import _chain_kernels as kernels
 from sec_lab.event_chain import EventChain
 
-_CODE_OF_RELATION = np.zeros(10, np.uint8)
-_CODE_OF_RELATION[[0, 1, 2, 9]] = 0, 1, 2, 3
+CODE_OF_RELATION = np.zeros(10, np.uint8)
+CODE_OF_RELATION[[0, 1, 2, 9]] = 0, 1, 2, 3
+"""Relations as 0, 1, 2, 3, which is what compiled loops count in."""
 N_RELATIONS = 4
 
 
@@ -49,7 +50,7 @@ class PackedChains:
         tables = []
         for chain, name in zip(chains, names, strict=True):
             changing = check_comparable(chain, name)
-            tables.append(_CODE_OF_RELATION[chain.relations[changing]])
+            tables.append(CODE_OF_RELATION[chain.relations[changing]])
         self._lay_out(tables, derived=derived)
 
     @classmethod

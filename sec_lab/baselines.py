@@ -22,16 +22,13 @@ from sklearn.utils.validation import check_is_fitted
 
 from sec_lab import _network_kernels as kernels
 from sec_lab._noise_kernels import compare_with_samples
-from sec_lab._packed_chains import check_comparable
+from sec_lab._packed_chains import CODE_OF_RELATION, check_comparable
 from sec_lab.event_chain import EventChain
 from sec_lab.similarity import EFFORT, check_options
 from sec_lab.similarity import Normalizer as RowNormalizer
 
 Chains = Sequence[EventChain]
 Updates = Literal["sample", "epoch"]
-
-_CODE = np.zeros(10, np.int64)
-_CODE[[0, 1, 2, 9]] = range(4)
 
 
 def chain_vectors(chains: Chains, *, n_inputs: int = 36) -> NDArray[np.float64]:
@@ -157,11 +154,30 @@ class ThesisNetwork(ClassifierMixin, BaseEstimator):
         self.random_state = random_state
 
     def fit(self, X: Chains, y: ArrayLike) -> Self:
-        """Train on chains and their classes."""
+        """Train on chains and their classes.
+
+        Parameters
+        ----------
+        X : sequence of n EventChain
+        y : (n,) array_like
+            Their classes, at least two.
+
+        Raises
+        ------
+        TypeError
+            If X is no sequence of event chains.
+        ValueError
+            If there are fewer than two classes or another number of them than of chains, or an option is out of range.
+        """
         if self.updates not in get_args(Updates):
             raise ValueError(f"updates: expected one of {get_args(Updates)}, got {self.updates!r}")
-        if self.epochs < 1 or not self.learning_rate > 0:
-            raise ValueError(f"epochs, learning_rate: expected positive ones, got {self.epochs}, {self.learning_rate}")
+        hidden = self.n_hidden
+        if not isinstance(hidden, tuple | list) or len(hidden) != 2 or not all(_is_count(units) for units in hidden):
+            raise ValueError(f"n_hidden: expected two whole numbers of at least 1, got {hidden!r}")
+        if not _is_count(self.epochs):
+            raise ValueError(f"epochs: expected a whole number of at least 1, got {self.epochs!r}")
+        if not 0 < self.learning_rate < np.inf:
+            raise ValueError(f"learning_rate: expected a finite number above 0, got {self.learning_rate!r}")
         inputs = chain_vectors(X, n_inputs=self.n_inputs)
         self.classes_, targets = _classes(y, len(X))
         rng = np.random.default_rng(check_random_state(self.random_state).randint(2**31))
@@ -184,6 +200,7 @@ class ThesisNetwork(ClassifierMixin, BaseEstimator):
 
     def predict(self, X: Chains) -> NDArray[Any]:
         """Class whose code is closest to the outputs."""
+        check_is_fitted(self)
         return np.asarray(self.classes_[closest_code(self.decision_function(X))])
 
 
@@ -248,6 +265,7 @@ class SimilarityClassifier(ClassifierMixin, BaseEstimator):
 
     def predict(self, X: Chains) -> NDArray[Any]:
         """Class whose code is closest to the similarities."""
+        check_is_fitted(self)
         return np.asarray(self.classes_[closest_code(self.decision_function(X))])
 
 
@@ -261,9 +279,9 @@ def _similarities(
     n, (m, k) = len(chains), shapes.max(axis=0)
     codes = np.zeros((n, m, k), np.uint8)
     for room, chain in zip(codes, chains, strict=True):
-        room[: chain.relations.shape[0], : chain.relations.shape[1]] = _CODE[chain.relations]
+        room[: chain.relations.shape[0], : chain.relations.shape[1]] = CODE_OF_RELATION[chain.relations]
     rows, columns = np.arange(m) < shapes[:, :1], np.arange(k) < shapes[:, 1:]
-    seed = _CODE[model.relations[model.changing_rows]].astype(np.uint8)
+    seed = CODE_OF_RELATION[model.relations[model.changing_rows]]
     spatial, temporal, exact = np.empty(n), np.empty(n), np.empty(n, np.bool_)
     # Objects are of no interest here: all are one.
     nobody = np.zeros((n, m, 2), np.int64)
@@ -306,7 +324,13 @@ def string_kernel_machine(*, longest: int = 3, cost: float = 10.0) -> Pipeline:
     Returns
     -------
     sklearn.pipeline.Pipeline
-        For sequences of chains; ``decision_function`` has one column a class.
+        For sequences of chains; ``decision_function`` has one column a class (and is flat for two, as ever there).
+        What is no event chain is a TypeError.
+
+    Raises
+    ------
+    ValueError
+        If words are shorter than one relation, or the cost is not above 0.
 
     Examples
     --------
@@ -316,9 +340,12 @@ def string_kernel_machine(*, longest: int = 3, cost: float = 10.0) -> Pipeline:
     """
     if longest < 1:
         raise ValueError(f"longest: expected at least 1, got {longest}")
+    if not cost > 0:
+        raise ValueError(f"cost: expected a number above 0, got {cost}")
     words: Callable[[EventChain], list[str]] = _RowWords(longest)
     machine = SVC(kernel="linear", C=cost, decision_function_shape="ovr")
-    return make_pipeline(CountVectorizer(analyzer=words, lowercase=False), Normalizer(), machine)
+    counted = CountVectorizer(analyzer=words, lowercase=False)
+    return make_pipeline(FunctionTransformer(_checked_chains), counted, Normalizer(), machine)
 
 
 class _RowWords:
@@ -353,7 +380,7 @@ def chain_features(chains: Chains) -> NDArray[np.float64]:
     _check_chains(chains)
     features = []
     for chain in chains:
-        codes = _CODE[chain.relations]
+        codes = CODE_OF_RELATION[chain.relations].astype(np.int64)
         m, k = codes.shape
         is_code = codes[:, :, None] == np.arange(4)
         steps = 4 * codes[:, :-1] + codes[:, 1:]
@@ -399,7 +426,18 @@ def boosted_trees(*, n_trees: int = 100, random_state: int | None = None) -> Pip
     return make_pipeline(FunctionTransformer(chain_features), trees)
 
 
+def _checked_chains(chains: Chains) -> Chains:
+    _check_chains(chains)
+    return chains
+
+
+def _is_count(n: object) -> bool:
+    return isinstance(n, int | np.integer) and not isinstance(n, bool) and n >= 1
+
+
 def _check_chains(chains: Chains) -> None:
+    if isinstance(chains, EventChain):
+        raise TypeError("chains: expected a sequence of event chains, got a single one")
     if not len(chains):
         raise ValueError("chains: expected at least one event chain, got none")
     for chain in chains:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sec_lab import _finding_kernels as kernels
 from sec_lab._learning_kernels import step_five
+from sec_lab._packed_chains import CODE_OF_RELATION
 from sec_lab.action_model import ActionModel
 from sec_lab.codes import Relation
 from sec_lab.event_chain import EventChain
@@ -33,8 +34,6 @@ LEAST_PERCENT = 80.0
 _ABSENT = 2
 _CODE = np.zeros(10, np.uint8)
 _CODE[[Relation.OVERLAPPING, Relation.TOUCHING, Relation.ABSENT]] = kernels.CONTACT, kernels.CONTACT, _ABSENT
-_STEP_FIVE_CODE = np.zeros(10, np.uint8)
-_STEP_FIVE_CODE[[0, 1, 2, 9]] = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -117,9 +116,9 @@ def time_slices(
     curves: dict[str, list[float]] = {name: [] for name in models}
     for n in range(1, chain.relations.shape[1] + 1):
         seen = chain.relations[:, :n]
-        codes = _STEP_FIVE_CODE[seen[(seen != seen[:, :1]).any(axis=1)]]
+        codes = CODE_OF_RELATION[seen[(seen != seen[:, :1]).any(axis=1)]]
         for name, model in models.items():
-            wanted = _STEP_FIVE_CODE[model.chain.relations[model.chain.changing_rows]]
+            wanted = CODE_OF_RELATION[model.chain.relations[model.chain.changing_rows]]
             _, temporal = step_five(
                 wanted, np.ascontiguousarray(codes), int(normalizer == "shorter"), float(tolerance_percent), effort
             )

@@ -7,19 +7,16 @@ numbers do not depend on threads, processes or machines.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args, overload
+from typing import Literal, get_args, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab import _noise_kernels as kernels
-from sec_lab._packed_chains import check_comparable
+from sec_lab._packed_chains import CODE_OF_RELATION, check_comparable
 from sec_lab.codes import Relations, as_relations
 from sec_lab.event_chain import EventChain
 from sec_lab.similarity import EFFORT, Normalizer, check_options
-
-if TYPE_CHECKING:
-    pass
 
 Mode = Literal["flip and add", "add only", "flip only"]
 AddedValues = Literal["uniform", "lasting"]
@@ -30,8 +27,6 @@ LEVELS = tuple(round(0.1 * step, 1) for step in range(11))
 
 RELATIONS = (0, 1, 2, 9)
 
-_CODE = np.zeros(10, np.uint8)
-_CODE[list(RELATIONS)] = range(4)
 BLOCK = 1000
 """Samples that are drawn with one generator."""
 
@@ -182,18 +177,19 @@ def noisy_samples(
         rows[:, 1::2] = rng.random((n, m - 1)) < level
         columns[:, 1::2] = rng.random((n, k - 1)) < level
         if noise.added_values == "lasting":
-            _hold(relations, rng)
+            _hold(relations, columns, rng)
     return NoisySamples(seed, relations, rows, columns, _added_pairs(seed, n, rng, noise.added_pair))
 
 
-def _hold(relations: Relations, rng: np.random.Generator) -> None:
-    """Let what is added hold on to what was there before, with even chance."""
+def _hold(relations: Relations, columns: NDArray[np.bool_], rng: np.random.Generator) -> None:
+    """Let what is added hold on to what was there before, with even chance; places that are not there are no before."""
     n, n_rows, n_columns = relations.shape
     holds = rng.random((n, n_rows, n_columns), dtype=np.float32) < 0.5
+    last = relations[:, :, 0].copy()
     for x in range(1, n_columns):
         added = slice(1, None, 2) if x % 2 == 0 else slice(None)
-        before, now = relations[:, added, x - 1], relations[:, added, x]
-        relations[:, added, x] = np.where(holds[:, added, x], before, now)
+        relations[:, added, x] = np.where(holds[:, added, x], last[:, added], relations[:, added, x])
+        last = np.where(columns[:, x, None], relations[:, :, x], last)
 
 
 def _added_pairs(seed: EventChain, n: int, rng: np.random.Generator, kind: AddedPair) -> NDArray[np.int64]:
@@ -288,8 +284,8 @@ def compare_with_seed(
     spatial, temporal, exact = np.empty(n), np.empty(n), np.empty(n, np.bool_)
     objects = np.empty((n, 3), np.int64)
     kernels.compare_with_samples(
-        _CODE[seed.relations[changing]], sorter[np.searchsorted(order, seed.pairs[changing], sorter=sorter)],
-        len(first), len(order), _CODE[samples.relations], samples.rows, samples.columns, number,
+        CODE_OF_RELATION[seed.relations[changing]], sorter[np.searchsorted(order, seed.pairs[changing], sorter=sorter)],
+        len(first), len(order), CODE_OF_RELATION[samples.relations], samples.rows, samples.columns, number,
         int(normalizer == "shorter"), float(tolerance_percent), effort, spatial, temporal, exact, objects,
     )  # fmt: skip
     return SeedComparison(spatial, temporal, exact, len(first), *objects.T)

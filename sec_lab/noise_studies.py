@@ -51,17 +51,28 @@ class NoiseStudy:
 
     def mean(self, measure: Literal["similarity", "objects", "tied"] = "similarity") -> "pd.DataFrame":
         """Means in percent, one row a level, one column a seed."""
-        return _table(getattr(self, measure).mean(axis=2), self)
+        return _table(self._values(measure).mean(axis=2), self)
 
     def standard_error(self, measure: Literal["similarity", "objects", "tied"] = "similarity") -> "pd.DataFrame":
         """Standard errors of the means in percentage points; not a number where there is a single sample."""
-        values = getattr(self, measure)
-        n = values.shape[2]
-        spread = values.std(axis=2, ddof=1) if n > 1 else np.full(values.shape[:2], np.nan)
-        return _table(spread / np.sqrt(n), self)
+        return _table(_standard_errors(self._values(measure)), self)
+
+    def _values(self, measure: str) -> NDArray[np.float64]:
+        if measure not in ("similarity", "objects", "tied"):
+            raise ValueError(f"measure: expected 'similarity', 'objects' or 'tied', got {measure!r}")
+        values: NDArray[np.float64] = getattr(self, measure)
+        return values
 
 
-def _table(values: NDArray[np.float64], study: NoiseStudy) -> "pd.DataFrame":
+def _standard_errors(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the means over the last axis; not a number where there is a single value."""
+    n = values.shape[2]
+    spread = values.std(axis=2, ddof=1) if n > 1 else np.full(values.shape[:2], np.nan)
+    errors: NDArray[np.float64] = spread / np.sqrt(n)
+    return errors
+
+
+def _table(values: NDArray[np.float64], study: "NoiseStudy | ModelStudy") -> "pd.DataFrame":
     import pandas as pd
 
     return pd.DataFrame(values.T, index=pd.Index(study.levels, name="noise level p"), columns=list(study.seeds))
@@ -161,10 +172,11 @@ class ModelStudy:
 
     def mean(self) -> "pd.DataFrame":
         """Mean similarity in percent, one row a level, one column a seed."""
-        import pandas as pd
+        return _table(self.similarity.mean(axis=2), self)
 
-        index = pd.Index(self.levels, name="noise level p")
-        return pd.DataFrame(self.similarity.mean(axis=2).T, index=index, columns=list(self.seeds))
+    def standard_error(self) -> "pd.DataFrame":
+        """Standard errors of the means in percentage points; not a number where there is a single model."""
+        return _table(_standard_errors(self.similarity), self)
 
 
 def model_study(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab.event_chain import EventChain
-from sec_lab.noise import LEVELS, Noise, noisy_samples, shuffled_rows
+from sec_lab.noise import LEVELS, Noise, as_count, as_level, noisy_samples, shuffled_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,6 +50,9 @@ class OpponentStudy:
             arrays = {key: _protected(array) for key, array in getattr(self, name).items()}
             object.__setattr__(self, name, MappingProxyType(arrays))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.classes, self.levels, self.known, dict(self.answers), dict(self.outputs))
+
 
 def _protected(array: NDArray[Any]) -> NDArray[Any]:
     copy = np.array(array)
@@ -75,6 +78,13 @@ def labelled_samples(
     shuffle : bool, optional
         Put the rows of every sample in any order.
 
+    Raises
+    ------
+    TypeError
+        If the seeds are no mapping.
+    ValueError
+        If there is no seed, or as in :func:`~sec_lab.noise.noisy_samples`.
+
     Examples
     --------
     >>> from sec_lab.noise_seeds import CLASS_SEEDS
@@ -82,6 +92,10 @@ def labelled_samples(
     >>> len(chains), names[0].item()
     (8, 'moving')
     """
+    if not isinstance(seeds, Mapping):
+        raise TypeError(f"seeds: expected a mapping of names to event chains, got {type(seeds).__name__}")
+    if not seeds:
+        raise ValueError("seeds: expected at least one, got none")
     chains: list[EventChain] = []
     for seed in seeds.values():
         samples = noisy_samples(seed, p, n_samples=n_samples, rng=rng, noise=noise)
@@ -98,39 +112,93 @@ def opponent_study(
     n_samples: int = 100,
     noise: Noise = FLIPS,
     shuffle: bool = False,
+    progress: bool = False,
 ) -> OpponentStudy:
     """Let trained classifiers judge the same fresh samples of every level.
 
     Parameters
     ----------
     classifiers : mapping of str to classifier
-        With ``classes_``, ``predict`` and ``decision_function`` or ``predict_proba`` for sequences of chains.
-    seeds, rng, levels, n_samples, noise, shuffle
+        Fitted ones, with ``classes_``, ``predict`` and ``decision_function`` or ``predict_proba`` for sequences of
+        chains; their classes are the names of the seeds.
+    seeds, rng, n_samples, noise, shuffle
         As in :func:`labelled_samples`.
+    levels : sequence of float, optional
+        Noise levels, 0 to 1.
+    progress : bool, optional
+        Show a progress bar.
 
     Raises
     ------
+    TypeError
+        If classifiers or seeds are no mappings.
     ValueError
-        If there is no classifier, or as in :func:`~sec_lab.noise.noisy_samples`.
+        If there is no classifier, level or seed, a classifier knows other classes, or as in
+        :func:`~sec_lab.noise.noisy_samples`.
+    sklearn.exceptions.NotFittedError
+        If a classifier has learned nothing yet.
+
+    Examples
+    --------
+    >>> from sec_lab.baselines import string_kernel_machine
+    >>> from sec_lab.noise_seeds import CLASS_SEEDS
+    >>> machine = string_kernel_machine().fit(list(CLASS_SEEDS.values()), list(CLASS_SEEDS))
+    >>> study = opponent_study(
+    ...     {"kernel": machine}, CLASS_SEEDS, levels=[0], n_samples=2, rng=np.random.default_rng(0)
+    ... )
+    >>> study.answers["kernel"].tolist()
+    [[0, 0, 1, 1, 2, 2, 3, 3]]
     """
-    if not classifiers:
-        raise ValueError("classifiers: expected at least one, got none")
+    from tqdm import tqdm
+
+    _check_fitted(classifiers, list(seeds))
+    as_count(n_samples, "n_samples")
+    levels = [as_level(level) for level in levels]
+    if not levels:
+        raise ValueError("levels: expected at least one noise level, got none")
     names = list(seeds)
     answers: dict[str, list[NDArray[np.int64]]] = {name: [] for name in classifiers}
     outputs: dict[str, list[NDArray[np.float64]]] = {name: [] for name in classifiers}
     known = np.repeat(np.arange(len(names)), n_samples)
-    for level in levels:
+    for level in tqdm(levels, unit="level", desc="judging", disable=not progress):
         chains, _ = labelled_samples(seeds, level, n_samples=n_samples, rng=rng, noise=noise, shuffle=shuffle)
         for name, machine in classifiers.items():
             order = [machine.classes_.tolist().index(one) for one in names]
             said = getattr(machine, "decision_function", None) or machine.predict_proba
-            outputs[name].append(np.asarray(said(chains), np.float64)[:, order])
+            output = np.asarray(said(chains), np.float64)
+            if output.ndim == 1:
+                # Of two classes scikit-learn gives only what speaks for the second.
+                output = np.column_stack([-output, output])
+            outputs[name].append(output[:, order])
             answers[name].append(np.array([names.index(answer) for answer in machine.predict(chains).tolist()]))
     return OpponentStudy(
         tuple(names), np.asarray(levels, np.float64), known,
         {name: np.stack(found) for name, found in answers.items()},
         {name: np.stack(found) for name, found in outputs.items()},
     )  # fmt: skip
+
+
+def _check_fitted(classifiers: Mapping[str, Any], names: Sequence[str]) -> None:
+    from sklearn.exceptions import NotFittedError
+
+    if not isinstance(classifiers, Mapping):
+        raise TypeError(f"classifiers: expected a mapping of names to classifiers, got {type(classifiers).__name__}")
+    if not classifiers:
+        raise ValueError("classifiers: expected at least one, got none")
+    for name, machine in classifiers.items():
+        try:
+            known = np.asarray(machine.classes_).tolist()
+        except AttributeError as error:
+            raise NotFittedError(f"classifiers: expected fitted ones, got {name!r} that has learned nothing") from error
+        if sorted(map(str, known)) != sorted(map(str, names)):
+            raise ValueError(f"seeds: expected the classes of {name!r}, {known}, got {list(names)}")
+
+
+def _of(study: OpponentStudy, classifier: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Answers and outputs of a classifier."""
+    if classifier not in study.answers:
+        raise ValueError(f"classifier: expected one of {list(study.answers)}, got {classifier!r}")
+    return study.answers[classifier], study.outputs[classifier]
 
 
 def positives(study: OpponentStudy, classifier: str) -> "pd.DataFrame":
@@ -146,10 +214,15 @@ def positives(study: OpponentStudy, classifier: str) -> "pd.DataFrame":
     pandas.DataFrame
         One row a level; columns (class, ``"TP"`` or ``"FP"``). A false positive is a sample of another class that was
         taken for this one.
+
+    Raises
+    ------
+    ValueError
+        If there is no such classifier.
     """
     import pandas as pd
 
-    answers = study.answers[classifier]
+    answers, _ = _of(study, classifier)
     columns = {}
     for number, name in enumerate(study.classes):
         of_class = study.known == number
@@ -181,11 +254,16 @@ def paired_test(study: OpponentStudy, one: str, other: str) -> "pd.DataFrame":
     pandas.DataFrame
         One row a level: how many samples only the one or only the other has right, the probability of a difference as
         large by chance, and the same after Holm's correction for all levels.
+
+    Raises
+    ------
+    ValueError
+        If there is no such classifier.
     """
     import pandas as pd
     from scipy.stats import binomtest
 
-    right = [study.answers[name] == study.known for name in (one, other)]
+    right = [_of(study, name)[0] == study.known for name in (one, other)]
     only_one, only_other = (right[0] & ~right[1]).sum(axis=1), (right[1] & ~right[0]).sum(axis=1)
     p_values = np.array(
         [
@@ -203,8 +281,13 @@ def paired_test(study: OpponentStudy, one: str, other: str) -> "pd.DataFrame":
     )
 
 
-def precision_recall(study: OpponentStudy, classifier: str, level: float) -> "dict[str, tuple[Any, Any]]":
+def precision_recall(
+    study: OpponentStudy, classifier: str, level: float, *, relative: bool = False
+) -> "dict[str, tuple[Any, Any]]":
     """Recall and precision of each class for all thresholds of the outputs (Fig. 3.10).
+
+    What the threshold is for, the thesis does not say. Either each output stands for itself; or what counts is how far
+    it is above the best of the others of the same sample, as the answer is the class with the largest output.
 
     Parameters
     ----------
@@ -212,6 +295,8 @@ def precision_recall(study: OpponentStudy, classifier: str, level: float) -> "di
     classifier : str
     level : float
         One of the levels of the study.
+    relative : bool, optional
+        Take each output less the best of the others, instead of the output itself.
 
     Returns
     -------
@@ -221,14 +306,27 @@ def precision_recall(study: OpponentStudy, classifier: str, level: float) -> "di
     Raises
     ------
     ValueError
-        If the level was not studied.
+        If the level was not studied, there is no such classifier, or nothing to be relative to.
+
+    Examples
+    --------
+    Each sample is most like its own class, but what the second is like is larger altogether:
+
+    >>> outputs = np.array([[[0.4, 0.1], [0.8, 0.9]]])
+    >>> study = OpponentStudy(("a", "b"), np.array([0.1]), np.array([0, 1]), {"one": [[0, 1]]}, {"one": outputs})
+    >>> precision_recall(study, "one", 0.1)["a"][1], precision_recall(study, "one", 0.1, relative=True)["a"][1]
+    (array([0.5, 0. , 1. ]), array([0.5, 1. , 1. ]))
     """
     from sklearn.metrics import precision_recall_curve
 
     at = np.flatnonzero(np.isclose(study.levels, level))
     if not len(at):
         raise ValueError(f"level: expected one of {study.levels.tolist()}, got {level}")
-    said = study.outputs[classifier][at[0]]
+    said = _of(study, classifier)[1][at[0]]
+    if relative:
+        if said.shape[1] < 2:
+            raise ValueError(f"relative: expected at least two classes, got {said.shape[1]}")
+        said = np.column_stack([said[:, k] - np.delete(said, k, axis=1).max(axis=1) for k in range(said.shape[1])])
     curves = {}
     for number, name in enumerate(study.classes):
         precision, recall, _ = precision_recall_curve(study.known == number, said[:, number])

@@ -31,6 +31,7 @@ from sec_lab.viz.moments import draw_moments as draw_moments
 from sec_lab.viz.noise import draw_levels as draw_levels
 from sec_lab.viz.noise import draw_models as draw_models
 from sec_lab.viz.noise import draw_network as draw_network
+from sec_lab.viz.noise import draw_noisy_sample as draw_noisy_sample
 from sec_lab.viz.noise import draw_positives as draw_positives
 from sec_lab.viz.noise import draw_precision_recall as draw_precision_recall
 from sec_lab.viz.roles import RoleStrip as RoleStrip

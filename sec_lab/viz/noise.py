@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from sec_lab.viz.chain import draw_chain
 from sec_lab.viz.curves import draw_curves
@@ -16,8 +17,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from sec_lab.action_model import ActionModel
+    from sec_lab.noise import NoisySamples
 
 TP_COLOUR, FP_COLOUR = CURVE_COLOURS[:2]
+ADDED_COLOUR = "#d62f2f"
 CLASS_COLOURS = ("#d62f2f", "#2f8f4b", "#2459ad", "#22262c")
 """Red, green, blue and black for the classes, as in Fig. 3.10."""
 
@@ -39,7 +42,7 @@ def draw_levels(
         One row a level, one column a curve; at most six.
     y_label : str
     threshold : float, optional
-        A level in percent that gets a thin line.
+        A level in percent that gets a thin line, named at its right end.
     ax, title : optional
 
     Returns
@@ -59,9 +62,54 @@ def draw_levels(
             ax.errorbar(mean.index, mean[name], error[name], fmt="none", ecolor=colour, elinewidth=1.0, capsize=2.5)
     if threshold is not None:
         ax.axhline(threshold, color=SOFT, linewidth=0.8, linestyle=(0, (2, 2)))
-        # At the left no curve is so low.
-        ax.text(float(mean.index[0]), threshold + 1, f"{threshold:g} %", fontsize=SMALL_PT, color=SOFT)
+        # Right of the axes, where no curve can cross it; a legend that stands there makes room.
+        ax.annotate(f"{threshold:g} %", (1.01, threshold), xycoords=("axes fraction", "data"), va="center",
+                    fontsize=SMALL_PT, color=SOFT, annotation_clip=False)  # fmt: skip
+        legend = ax.get_legend()
+        if legend is not None:
+            legend.set_bbox_to_anchor((1.1, 0.5))
     ax.set_ylim(0, 105)
+    return ax
+
+
+def draw_noisy_sample(
+    samples: "NoisySamples", number: int = 0, *, ax: Axes | None = None, title: str | None = None
+) -> Axes:
+    """Draw a noisy sample, with red frames around the rows and columns that noise has added (Fig. 3.1).
+
+    Parameters
+    ----------
+    samples : NoisySamples
+    number : int, optional
+        Which of them.
+    ax, title : optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ValueError
+        If there is no such sample.
+
+    Examples
+    --------
+    >>> from sec_lab.noise import noisy_samples
+    >>> from sec_lab.noise_seeds import LIFTING
+    >>> len(draw_noisy_sample(noisy_samples(LIFTING, 1.0, rng=np.random.default_rng(0))).patches) >= 6
+    True
+    """
+    if not -len(samples) <= number < len(samples):
+        raise ValueError(f"number: expected one of {len(samples)} samples, got {number}")
+    ax = draw_chain(samples[number], ax=ax, title=title)
+    # Every other place is a gap of the seed.
+    rows, columns = (np.flatnonzero(there[number]) % 2 == 1 for there in (samples.rows, samples.columns))
+    frames = [((0, y), len(columns), 1) for y in np.flatnonzero(rows).tolist()]
+    frames += [((x, 0), 1, len(rows)) for x in np.flatnonzero(columns).tolist()]
+    for corner, width, height in frames:
+        ax.add_patch(Rectangle(corner, width, height, fill=False, edgecolor=ADDED_COLOUR, linewidth=1.6, clip_on=False,
+                               zorder=5, gid="added"))  # fmt: skip
     return ax
 
 

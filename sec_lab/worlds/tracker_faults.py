@@ -27,7 +27,8 @@ def broken_tracks(
     """Break label images of a movie at random times.
 
     Every segment but the background suffers a fault that begins in any frame with the same probability, unless one
-    of it lasts already.
+    of it lasts already. A swap strikes another segment too, and for good: at the same rate segments suffer twice as
+    many swaps as other faults, and these do not end.
 
     Parameters
     ----------
@@ -39,7 +40,8 @@ def broken_tracks(
         segments exchange their labels for good. ``"flicker"``: for ``duration`` frames, a segment grows over its
         neighbours in every other frame by ``border_px`` and leaves as much of itself to the background in the others.
     per_hundred_frames : float
-        Expected faults of a segment that is there for a hundred frames, 0 to 100.
+        Expected faults that begin with a segment that is there for a hundred frames, 0 to 100. By swaps that begin
+        with others it suffers as many again.
     rng : numpy.random.Generator
     background : int, optional
         Label that suffers no fault, and takes what is lost.
@@ -69,8 +71,8 @@ def broken_tracks(
     if not 0 <= per_hundred_frames <= 100:
         raise ValueError(f"per_hundred_frames: expected 0 to 100, got {per_hundred_frames}")
     for name, value in (("duration", duration), ("border_px", border_px)):
-        if value < 1:
-            raise ValueError(f"{name}: expected at least 1, got {value}")
+        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
+            raise ValueError(f"{name}: expected a whole number of at least 1, got {value!r}")
     whole = as_integers(labels, what="labels", ndim=3)
     if whole.size and not 0 <= whole.min() <= whole.max() < 2**15:
         raise ValueError(f"labels: expected 0 to {2**15 - 1}, got {whole.min()} to {whole.max()}")

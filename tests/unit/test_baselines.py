@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.exceptions import NotFittedError
 
 import sec_lab as sl
 from sec_lab import _network_kernels as kernels
@@ -179,7 +180,25 @@ def test_bad_input_is_refused() -> None:
         SimilarityClassifier().fit(chains, names[:3])
     with pytest.raises(ValueError, match="updates: expected one of"):
         ThesisNetwork(updates="never").fit(chains, names)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="epochs, learning_rate: expected positive ones"):
-        ThesisNetwork(epochs=0).fit(chains, names)
+    for options, message in (
+        ({"epochs": 0}, "epochs: expected a whole number of at least 1, got 0"),
+        ({"epochs": 1.5}, "epochs: expected a whole number of at least 1, got 1.5"),
+        ({"learning_rate": np.nan}, "learning_rate: expected a finite number above 0, got nan"),
+        ({"n_hidden": (5,)}, r"n_hidden: expected two whole numbers of at least 1, got \(5,\)"),
+        ({"n_hidden": (0, 5)}, r"n_hidden: expected two whole numbers of at least 1, got \(0, 5\)"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            ThesisNetwork(**options).fit(chains, names)  # type: ignore[arg-type]
+    makers: list[Any] = [SimilarityClassifier, ThesisNetwork, string_kernel_machine, boosted_trees]
+    for make in makers:
+        with pytest.raises(NotFittedError):
+            make().predict(chains)
+        fitted = make(**({"epochs": 2} if make is ThesisNetwork else {})).fit(chains, names)
+        with pytest.raises(TypeError, match="chains: expected a sequence of event chains, got a single one"):
+            fitted.predict(chains[0])
+        with pytest.raises(TypeError, match="chains: expected event chains, got int"):
+            fitted.predict([1, 2])
+    with pytest.raises(ValueError, match="cost: expected a number above 0, got 0"):
+        string_kernel_machine(cost=0)
     with pytest.raises(ValueError, match="longest: expected at least 1"):
         string_kernel_machine(longest=0)

@@ -1,11 +1,14 @@
 """Classifiers against each other (§3.2.2): counts, test and curves, held against counting by hand."""
 
+import pickle
 from math import comb
+from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.exceptions import NotFittedError
 
-from sec_lab.baselines import ThesisNetwork, boosted_trees, string_kernel_machine
+from sec_lab.baselines import SimilarityClassifier, ThesisNetwork, boosted_trees, string_kernel_machine
 from sec_lab.noise import Noise
 from sec_lab.noise_seeds import CLASS_SEEDS
 from sec_lab.opponents import (
@@ -90,3 +93,70 @@ def test_samples_are_shuffled_and_added_to_if_asked_for() -> None:
     assert sum(same) < 3
     with pytest.raises(ValueError, match="classifiers: expected at least one, got none"):
         opponent_study({}, CLASS_SEEDS, rng=rng)
+
+
+def test_relative_outputs_are_held_against_the_best_other_one_of_the_sample() -> None:
+    outputs = np.array([[[0.5, 0.1, 0.4], [0.3, 0.2, 0.1], [0.6, 0.9, 0.2], [0.55, 0.7, 0.8]]])
+    known, answers = np.array([0, 0, 1, 2]), np.array([[0, 0, 1, 2]])
+    study = OpponentStudy(("a", "b", "c"), np.array([0.1]), known, {"one": answers}, {"one": outputs})
+    # The largest outputs for "a" belong to samples of others; less the best other one, its own come first.
+    recall, precision = precision_recall(study, "one", 0.1)["a"]
+    assert precision[recall == 0.5].max() < 1
+    recall, precision = precision_recall(study, "one", 0.1, relative=True)["a"]
+    assert precision[recall == 1.0].max() == 1
+
+
+def test_a_study_can_be_sent_elsewhere() -> None:
+    here = made_up()
+    there = pickle.loads(pickle.dumps(here))
+    assert there.classes == here.classes
+    for name in here.answers:
+        assert np.array_equal(there.answers[name], here.answers[name])
+        assert np.array_equal(there.outputs[name], here.outputs[name])
+
+
+def test_two_classes_have_one_column_each() -> None:
+    two = {name: CLASS_SEEDS[name] for name in ("pushing", "cutting")}
+    training = labelled_samples(two, 0.1, n_samples=10, rng=np.random.default_rng(0))
+    machines: dict[str, Any] = {
+        "similarity": SimilarityClassifier().fit(*training),
+        "kernel": string_kernel_machine().fit(*training),
+        "trees": boosted_trees(n_trees=5, random_state=0).fit(*training),
+    }
+    study = opponent_study(machines, two, rng=np.random.default_rng(1), n_samples=10, levels=[0.1])
+    for name in machines:
+        assert study.outputs[name].shape == (1, 20, 2)
+        assert (study.outputs[name].argmax(axis=2) == study.answers[name]).all()
+        assert (study.answers[name] == study.known).mean() > 0.9
+
+
+def test_bad_input_is_told_by_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    training = labelled_samples(CLASS_SEEDS, 0.0, n_samples=2, rng=np.random.default_rng(0))
+    kernel: dict[str, Any] = {"kernel": string_kernel_machine().fit(*training)}
+    options: dict[str, Any] = {"rng": np.random.default_rng(0), "levels": [0.1], "n_samples": 2}
+    for changed, message in (
+        ({"levels": []}, "levels: expected at least one noise level, got none"),
+        ({"n_samples": -1}, "n_samples: expected a whole number of at least 1, got -1"),
+        ({"levels": [2]}, "p: expected a probability from 0 to 1, got 2"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            opponent_study(kernel, CLASS_SEEDS, **{**options, **changed})
+    with pytest.raises(ValueError, match=r"seeds: expected the classes of 'kernel', .*, got \['foo'\]"):
+        opponent_study(kernel, {"foo": CLASS_SEEDS["moving"]}, **options)
+    with pytest.raises(NotFittedError, match="classifiers: expected fitted ones, got 'kernel'"):
+        opponent_study({"kernel": string_kernel_machine()}, CLASS_SEEDS, **options)
+    with pytest.raises(TypeError, match="classifiers: expected a mapping"):
+        opponent_study([], CLASS_SEEDS, **options)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="seeds: expected at least one, got none"):
+        labelled_samples({}, 0.1, rng=np.random.default_rng(0))
+    study = made_up()
+    for call in (
+        lambda: positives(study, "foo"),
+        lambda: paired_test(study, "good", "foo"),
+        lambda: precision_recall(study, "foo", 0.1),
+    ):
+        with pytest.raises(ValueError, match=r"classifier: expected one of \['good', 'bad'\], got 'foo'"):
+            call()
+    assert not capsys.readouterr().err
+    opponent_study(kernel, CLASS_SEEDS, **options, progress=True)
+    assert "judging" in capsys.readouterr().err

@@ -98,12 +98,36 @@ def test_bad_input_is_refused() -> None:
         ({"fault": "melt"}, "fault: expected one of"),
         ({"per_hundred_frames": -1}, "per_hundred_frames: expected 0 to 100, got -1"),
         ({"per_hundred_frames": np.nan}, "per_hundred_frames: expected 0 to 100"),
-        ({"duration": 0}, "duration: expected at least 1, got 0"),
+        ({"duration": 0}, "duration: expected a whole number of at least 1, got 0"),
+        ({"duration": 2.5}, "duration: expected a whole number of at least 1, got 2.5"),
         ({"labels": np.full((1, 2, 2), 70000)}, "labels: expected 0 to 32767"),
     ):
         given = {"labels": movie(), "fault": "split", "per_hundred_frames": 1, **options}
         with pytest.raises(ValueError, match=says):
             broken_tracks(given.pop("labels"), given.pop("fault"), rng=rng, **given)
+
+
+def test_a_bad_study_of_faults_is_refused() -> None:
+    good: dict[str, Any] = {"movies": ["opening_book_1_laboratory"], "rates": [1.0], "repeats": 1, "seed": 1}
+    for changed, says in (
+        ({"movies": ["foo_1_laboratory"]}, "movies: expected names as .*, got 'foo_1_laboratory'"),
+        ({"movies": []}, "movies: expected at least one, got none"),
+        ({"rates": [200]}, r"rates: expected faults in a hundred frames, 0 to 100, got \[200\]"),
+        ({"repeats": 0}, "repeats: expected a whole number of at least 1, got 0"),
+        ({"faults": ["melt"]}, "faults: expected some of .*, got 'melt'"),
+    ):
+        with pytest.raises(ValueError, match=says):
+            fault_study(TABLES.parent / "tabletop_actions", **{**good, **changed})
+
+
+def test_a_swap_strikes_two_segments() -> None:
+    # Of two segments that swap whenever one of them is struck, each suffers twice the rate.
+    labels = np.ones((4000, 1, 3), np.uint8)
+    labels[:, 0, :2] = 2, 3
+    broken, n_faults = broken_tracks(labels, "swap", per_hundred_frames=2, rng=np.random.default_rng(0))
+    suffered = int((np.diff(broken[:, 0, 0].astype(int)) != 0).sum())
+    assert abs(suffered / n_faults - 1) < 0.1
+    assert abs(suffered / 4000 - 2 * 0.02) <= 5 * np.sqrt(0.04 / 4000)
 
 
 def small_truth() -> Truth:

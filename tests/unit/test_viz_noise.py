@@ -2,9 +2,11 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
 import sec_lab as sl
 from sec_lab import viz
+from sec_lab.noise import noisy_samples
 from sec_lab.noise_seeds import LIFTING
 from sec_lab.viz.style import figure_of, png_bytes
 
@@ -18,6 +20,25 @@ def test_curves_have_bars_a_threshold_and_the_whole_range() -> None:
     assert [text.get_text() for text in ax.texts] == ["64 %"]
     assert len(ax.containers) == 2
     assert png_bytes(figure_of(ax))
+    # The name of the threshold stands right of the axes, clear of curves and legend.
+    box = ax.texts[0].get_window_extent()
+    legend = ax.get_legend()
+    assert legend is not None
+    assert box.x0 >= ax.get_window_extent().x1
+    assert not box.overlaps(legend.get_window_extent())
+
+
+def test_what_noise_added_is_framed() -> None:
+    samples = noisy_samples(LIFTING, 0.6, n_samples=3, rng=np.random.default_rng(1))
+    for number in range(3):
+        ax = viz.draw_noisy_sample(samples, number)
+        n_rows, n_columns = samples[number].relations.shape
+        frames = [patch for patch in ax.patches if patch.get_gid() == "added"]
+        assert len(frames) == n_rows - 3 + n_columns - 5
+        wide = [int(patch.get_y()) for patch in frames if patch.get_width() == n_columns]
+        assert wide == [y for y, there in enumerate(np.flatnonzero(samples.rows[number])) if there % 2]
+    with pytest.raises(ValueError, match="number: expected one of 3 samples, got 3"):
+        viz.draw_noisy_sample(samples, 3)
 
 
 def test_bars_are_the_counts() -> None:

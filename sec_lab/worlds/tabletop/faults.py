@@ -140,6 +140,7 @@ def fault_study(
     seed: int,
     faults: Sequence[Fault] = FAULTS,
     n_jobs: int | None = None,
+    progress: bool | None = None,
 ) -> tuple["pd.DataFrame", "pd.DataFrame"]:
     """Break all movies at all rates in all ways.
 
@@ -157,20 +158,47 @@ def fault_study(
         Kinds of faults.
     n_jobs : int, optional
         As in :class:`joblib.Parallel`.
+    progress : bool, optional
+        Show a progress bar; where somebody watches if left out.
 
     Returns
     -------
     movies, models : pandas.DataFrame
         One row a broken movie, and one row a model.
+
+    Raises
+    ------
+    ValueError
+        If there is no movie, rate or repeat, a fault is unknown, a rate is out of range, or a movie is none of the
+        tabletop movies.
+    sec_lab.files.UnusableFileError
+        If there is no such movie in the folder.
+
+    Examples
+    --------
+    >>> movies = ["opening_book_1_laboratory", "opening_book_2_laboratory"]
+    >>> broken, models = fault_study(
+    ...     Path("datasets/tabletop_actions"), movies=movies, rates=[2.0], repeats=1, seed=1, faults=["vanish"]
+    ... )  # doctest: +SKIP
     """
     import pandas as pd
     from joblib import Parallel, delayed
     from tqdm import tqdm
 
+    if not movies:
+        raise ValueError("movies: expected at least one, got none")
+    if not len(rates) or not all(0 <= rate <= 100 for rate in rates):
+        raise ValueError(f"rates: expected faults in a hundred frames, 0 to 100, got {list(rates)}")
+    if not isinstance(repeats, int) or repeats < 1:
+        raise ValueError(f"repeats: expected a whole number of at least 1, got {repeats!r}")
+    for fault in faults:
+        if fault not in FAULTS:
+            raise ValueError(f"faults: expected some of {FAULTS}, got {fault!r}")
     # Random numbers of its own for every movie, rate and repeat: leaving some out leaves the others as they are.
     tasks = [(folder / name, tuple(faults), tuple(rates), repeats, [seed, _number_of(name)]) for name in movies]
+    shown = sys.stderr.isatty() if progress is None else progress
     run = Parallel(n_jobs=n_jobs, return_as="generator")(delayed(_broken_chains)(*task) for task in tasks)
-    found = dict(zip(movies, tqdm(run, total=len(tasks), unit="movie", disable=not sys.stderr.isatty()), strict=True))
+    found = dict(zip(movies, tqdm(run, total=len(tasks), unit="movie", disable=not shown), strict=True))
     whole = {name: chains.pop(("none", 0.0, 0))[0] for name, chains in found.items()}
     bare = {name: chain_without_table(seen) for name, seen in whole.items()}
     rows = []
@@ -213,7 +241,10 @@ def _number_of(movie: str) -> int:
     """Place of a movie among those of its setting."""
     from sec_lab.worlds.tabletop.actions import ACTIONS, VERSIONS
 
-    return [f"{action}_{version}" for action in ACTIONS for version in VERSIONS].index(movie.rpartition("_")[0])
+    known = [f"{action}_{version}" for action in ACTIONS for version in VERSIONS]
+    if movie.rpartition("_")[0] not in known:
+        raise ValueError(f"movies: expected names as {known[0]}_laboratory, got {movie!r}")
+    return known.index(movie.rpartition("_")[0])
 
 
 def _broken_chains(
