@@ -257,7 +257,7 @@ def test_pictures_larger_than_those_that_are_kept() -> None:
 
 
 def test_the_widget_follows_slider_keys_and_clicks(seen: Seen) -> None:
-    explorer = ChainExplorer(lambda _: seen).wait()
+    explorer = ChainExplorer(lambda **_: seen).wait()
     book = explorer.book
     assert book is not None
     explorer._place.value = 5
@@ -286,7 +286,7 @@ def test_the_widget_follows_slider_keys_and_clicks(seen: Seen) -> None:
 
 
 def test_errors_are_sentences_and_the_widget_lives_on(seen: Seen, tmp_path: Path) -> None:
-    explorer = ChainExplorer(lambda _: seen).wait()
+    explorer = ChainExplorer(lambda **_: seen).wait()
     explorer._segments.value = (2,)
     explorer._frame.key = ["m", 1]
     assert explorer.alert == "merge: choose at least two segments that are parts of one object."
@@ -316,12 +316,12 @@ def test_work_that_takes_long_shows_how_far_it_is_and_can_be_stopped(seen: Seen)
     assert "of 10000 frames" in explorer._work._said.value
     explorer._work.stop()
     assert explorer.wait(10).alert == "Stopped; nothing was changed."
-    explorer.explore(lambda _: seen)
+    explorer.explore(lambda **_: seen)
     assert explorer.wait().book is not None
 
 
 def test_nothing_is_left_behind_by_a_thousand_moves(seen: Seen) -> None:
-    explorer = ChainExplorer(lambda _: seen).wait()
+    explorer = ChainExplorer(lambda **_: seen).wait()
 
     def move(n: int) -> None:
         for number in range(n):
@@ -344,7 +344,7 @@ def test_the_report_is_given_what_scrubs(seen: Seen, monkeypatch: pytest.MonkeyP
     from sec_lab.report import pages
 
     assert (pages.FOR_PAGES, pages.SCRUBBER) == (FOR_PAGES, SCRUBBER)
-    explorer = ChainExplorer(lambda _: seen).wait()
+    explorer = ChainExplorer(lambda **_: seen).wait()
     monkeypatch.delenv(FOR_PAGES, raising=False)
     assert SCRUBBER not in explorer._repr_mimebundle_()
     monkeypatch.setenv(FOR_PAGES, "1")

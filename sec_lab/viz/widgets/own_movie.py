@@ -41,7 +41,7 @@ def own_movie(
     masks : path-like, optional
         Label masks of any tracker (:func:`~sec_lab.segmentation.masks.open_masks`), with the movie or alone.
     folder : path-like, optional
-        Where files are saved.
+        Where files are saved; made if it is not there.
 
     Returns
     -------
@@ -227,14 +227,15 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
         if self.explorer.book is None:
             return
         try:
+            self._folder.mkdir(parents=True, exist_ok=True)
             observation = self.explorer.book.observation
             self.saved = save(observation, self._recording, folder=self._folder, name=self._name.value.strip())
         except Exception as error:  # noqa: BLE001 - an error in a callback would only reach a log that nobody reads
             self._say(sentence_of(error))
             return
-        self._said.value = "written: " + " and ".join(f"<code>{path.name}</code>" for path in self.saved)
+        self._said.value = "written: " + " and ".join(f"<code>{html.escape(str(path))}</code>" for path in self.saved)
 
-    def _look(self, path: str, masks: str, tell: Tell) -> Seen:
+    def _look(self, path: str, masks: str, *, tell: Tell) -> Seen:
         seen, self._recording = look_at(path, masks, tell)
         return seen
 

@@ -18,7 +18,7 @@ SCRUBBER = "application/vnd.sec-lab.scrubber+html"
 
 MOST_BYTES = 3_500_000
 """A page with an explorer and its figures stays below 5 MB."""
-_MOST_FRAMES, _MOST_WIDE = 120, 980
+_MOST_FRAMES, _MOST_WIDE = 150, 980
 _QUALITIES = (80, 65, 50)
 
 
