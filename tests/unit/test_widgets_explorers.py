@@ -283,6 +283,8 @@ BAD: dict[str, tuple[Callable[[], Explorer], str]] = {
     "match": (lambda: match_explorer(3, LIFTING), "one: expected an event chain or an observation, got int"),
     "still": (lambda: match_explorer(EventChain([[2, 2]], [(1, 2)]), LIFTING), "first chain"),
     "normaliser": (lambda: match_explorer(LIFTING, LIFTING, normalizer="other"), "normalizer: expected"),
+    "names": (lambda: match_explorer(LIFTING, LIFTING, row_names="words"), "row_names: expected one of"),
+    "frame": (lambda: segmentation_explorer(scene()[0], frame=3), "frame: expected one from 0 to 2, got 3"),
     "pictures": (lambda: match_explorer(LIFTING, LIFTING, pictures=([], {})), "pictures: expected two mappings"),
     "table": (lambda: table_explorer([[1, 2], [3, 4]]), "table: expected a table with names"),
     "classes": (lambda: table_explorer(demonstrations()[0], classes=["a"]), "classes: expected one for each of 8"),
