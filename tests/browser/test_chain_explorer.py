@@ -19,16 +19,21 @@ seen = sl.observe_segments(sl.Segmentation.from_labels(one.labels, names=one.nam
 chain_explorer(seen, recording=one.frames)
 """
 N_MOVES = 80
-# Filmed, so that no two frames are the same picture.
+# Filmed, with depth, so that no two frames are the same picture.
 FILMED = """
 import os
+from pathlib import Path
 import numpy as np
 import sec_lab as sl
 from sec_lab.viz.widgets import chain_explorer
+from sec_lab.worlds.tabletop.truth import read_truth
 
-folder = os.path.join(os.environ["SEC_LAB_ROOT"], "datasets/tabletop_actions/moving_object_1_laboratory")
-truth = sl.Segmentation.from_labels(np.load(os.path.join(folder, "truth.npz"))["labels"])
-chain_explorer(truth, recording=os.path.join(folder, "left.mp4"))
+folder = Path(os.environ["SEC_LAB_ROOT"]) / "datasets" / "tabletop_actions" / "moving_object_1_laboratory"
+true = read_truth(folder)
+frames = np.stack([frame.image for frame in sl.Recording.open(folder / "left.mp4")])
+movie = sl.Recording.from_frames(frames, depth=true.depth_mm / 1000, frames_per_second=25)
+segments = sl.Segmentation.from_labels(true.labels, background=1, names=true.names)
+chain_explorer(segments, recording=movie)
 """
 PIXEL = "(canvas, [x, y]) => Array.from(canvas.getContext('2d').getImageData(x, y, 1, 1).data.slice(0, 3))"
 SAYS = "([where, words]) => [...document.querySelectorAll(where)].some((e) => e.textContent.includes(words))"
@@ -165,9 +170,11 @@ STOPWATCH = """
 """
 
 
-def test_how_long_a_picture_takes_to_follow_the_slider(lab: Lab, capsys: pytest.CaptureFixture[str]) -> None:
+def test_how_long_a_picture_takes_to_follow_the_slider(
+    lab: Lab, capsys: pytest.CaptureFixture[str], screenshot: Callable[..., Path]
+) -> None:
     page = lab.open(FILMED)
-    says(page, "frame 0 ·")
+    says(page, "frame 0 · 0.00 s")
     box = page.locator(".sec-lab-explorer .widget-slider .noUi-base").bounding_box()
     assert box is not None
     page.get_by_role("img", name="frame with").evaluate(STOPWATCH)
@@ -181,6 +188,11 @@ def test_how_long_a_picture_takes_to_follow_the_slider(lab: Lab, capsys: pytest.
     page.mouse.up()
     says(page, f"frame {N_MOVES} ·")
     times = page.evaluate("globalThis.times")
+    page.get_by_role("img", name="event chain").focus()
+    page.keyboard.press("ArrowUp")
+    page.locator(".sec-lab-explorer .widget-label", has_text="plate, ").wait_for()
+    page.get_by_role("img", name="frame with").blur()
+    screenshot(page.locator(".sec-lab-explorer"), "chain_explorer_filmed")
     assert len(times) == N_MOVES
     median, late = np.percentile(times, (50, 95))
     with capsys.disabled():

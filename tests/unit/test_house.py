@@ -193,6 +193,27 @@ def test_ci_finds_recordings_beside_the_checkout(checkout: Path) -> None:
     assert run_ci(checkout, SEC_LAB_DATA="/somewhere") == "/somewhere"
 
 
+@pytest.mark.parametrize(("has_chromium", "can_install"), [(True, False), (False, True), (False, False)])
+def test_ci_installs_a_browser_where_there_is_none(checkout: Path, *, has_chromium: bool, can_install: bool) -> None:
+    script(checkout / ".ci" / "check_system.sh", "true")
+    programs = checkout.parent / "programs"
+    programs.mkdir()
+    for name in ("bash", "sh", "dirname", "cat"):
+        (programs / name).symlink_to(str(shutil.which(name)))
+    script(programs / "id", "echo 0")
+    script(programs / "make", 'echo "make $*"')
+    script(programs / "apt-get", f'echo "$*" >>"{checkout.parent}/asked"; [ "$1" = update ] || exit {1 - can_install}')
+    chromium = programs / "chromium"
+    if has_chromium:
+        script(chromium, "true")
+    environment = {"PATH": str(programs), "SEC_LAB_CHROMIUM": str(chromium)}
+    done = subprocess.run([str(checkout / ".ci" / "run")], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "make --no-print-directory test\n"
+    asked = checkout.parent / "asked"
+    assert ("chromium" in asked.read_text() if asked.exists() else False) == (not has_chromium)
+    assert ("browser tests will skip" in done.stderr) == (not has_chromium and not can_install)
+
+
 def make(*arguments: str) -> list[str]:
     # As if it were not called from make itself.
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
@@ -211,5 +232,12 @@ def test_make_test_ends_with_pytest() -> None:
     places = [next(place for place, command in enumerate(commands) if tool in command) for tool in tools]
     assert places == sorted(places)
     assert "pytest" in commands[-1]
-    for option in ("--doctest-modules", "--nbval ", "--nbval-current-env", "--benchmark-disable", "tests/unit"):
+    for option in (
+        "--doctest-modules",
+        "--nbval ",
+        "--nbval-current-env",
+        "--benchmark-disable",
+        "tests/unit",
+        "tests/browser",
+    ):
         assert option in commands[-1]

@@ -9,6 +9,7 @@ import ipywidgets
 import numpy as np
 from numpy.typing import NDArray
 
+from sec_lab.event_chain import Names
 from sec_lab.observation import Observation
 from sec_lab.pipeline import SegmentationMethod
 from sec_lab.recording import Recording
@@ -39,6 +40,7 @@ def chain_explorer(
     recording: Movie | None = None,
     segmentation: SegmentationMethod | Segmentation = "layers",
     how: How | None = None,
+    names: Names | None = None,
 ) -> "ChainExplorer":
     """Scrub a movie: frame with segments, scene graph, depth, and the chain with its column of now lit.
 
@@ -57,6 +59,8 @@ def chain_explorer(
     how : tuple, optional
         ``(over_time, relations)`` as of :func:`~sec_lab.pipeline.observe`: how relations are found, or were found, if
         it is neither of the ways that have a name. Needed for merging only.
+    names : mapping of int to str or None, optional
+        Names of segments; those that the source has if left out.
 
     Returns
     -------
@@ -83,7 +87,9 @@ def chain_explorer(
     movie = Recording.from_frames(recording) if isinstance(recording, np.ndarray) else recording
     if not isinstance(movie, Recording | str | os.PathLike | None):
         raise ValueError(f"recording: expected a Recording, frames or a path, got {type(recording).__name__}")
-    return ChainExplorer(lambda tell: see(source, recording=movie, segmentation=segmentation, how=how, tell=tell))
+    return ChainExplorer(
+        lambda tell: see(source, recording=movie, segmentation=segmentation, how=how, names=names, tell=tell)
+    )
 
 
 class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
@@ -92,8 +98,8 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
     Parameters
     ----------
     look : callable
-        Gives what is to be explored; called in a thread with ``tell(done, of)``. Without it there is nothing to see
-        yet.
+        Gives what is to be explored; called in a thread with ``tell=`` a function of (done, of). Without it there is
+        nothing to see yet.
 
     Attributes
     ----------
@@ -142,13 +148,13 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
             self.explore(look)
 
     def explore(self, look: Callable[..., Seen]) -> None:
-        """Show something else; called in a thread with ``tell(done, of)``."""
+        """Show something else, which ``look`` gives; it is called in a thread with ``tell``."""
         self._work.stop()
         self._work.wait()
         self.book = None
         self._body.layout.display = "none"
         self._alert.value = ""
-        self._work.start(look)
+        self._work.start(lambda tell: look(tell=tell))
         self._work.wait(_AT_ONCE_S)
 
     def wait(self, timeout_s: float | None = None) -> "ChainExplorer":
@@ -158,11 +164,12 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         """What a notebook stores; while the report is made also the explorer as a page without a kernel shows it."""
-        bundle = super()._repr_mimebundle_(**options)
+        return super()._repr_mimebundle_(**options) | self.for_pages()
+
+    def for_pages(self) -> dict[str, str]:
+        """While the report is made, what its pages show instead of a live explorer, by kind of output."""
         book = self.wait().book if os.environ.get(FOR_PAGES) else None
-        if book is not None:
-            bundle[SCRUBBER] = scrubber_html(book)
-        return bundle
+        return {} if book is None else {SCRUBBER: scrubber_html(book)}
 
     def __repr__(self) -> str:
         # Nothing in a stored notebook changes from one execution to the next but the number of the widget.

@@ -1,5 +1,6 @@
 """One's own movie in five minutes: open or upload it, see its chain, name and merge, compare, save."""
 
+import html
 import os
 from collections.abc import Callable
 from functools import partial
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _N_SHOWN = 10
+_SHOWN = {"temporal": "ψ temporal in %", "spatial": "ψ spatial in %"}
 
 
 def own_movie(
@@ -39,7 +41,7 @@ def own_movie(
     masks : path-like, optional
         Label masks of any tracker (:func:`~sec_lab.segmentation.masks.open_masks`), with the movie or alone.
     folder : path-like, optional
-        Where files are saved.
+        Where files are saved; made if it is not there.
 
     Returns
     -------
@@ -170,7 +172,7 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
             os.fspath(masks), description="masks", placeholder="of a tracker, if you have any", layout=wide,
             style=labelled,
         )  # fmt: skip
-        self._open = _button("open", "folder-open", "observe the movie", self.open)
+        self._open = _button("open", "folder-open", "observe the movie", self.observe_now)
         self._upload = Upload(f"or upload a movie (up to {MOST_MB} MB):")
         self._upload.on_file(self._uploaded)
         self._upload.on_problem(self.explorer.say)
@@ -190,12 +192,15 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
         self.add_class("sec-lab-own-movie")
         self.explorer.on_changed.append(self._changed)
         if os.fspath(path) or os.fspath(masks):
-            self.open()
+            self.observe_now()
 
     def __repr__(self) -> str:
         return "OwnMovie()"
 
-    def open(self) -> None:
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        return super()._repr_mimebundle_(**options) | self.explorer.for_pages()
+
+    def observe_now(self) -> None:
         """Observe what the fields name, in a thread."""
         self._below.layout.display = "none"
         self.explorer.explore(partial(self._look, self._path.value.strip(), self._masks.value.strip()))
@@ -222,21 +227,22 @@ class OwnMovie(ipywidgets.VBox):  # type: ignore[misc]
         if self.explorer.book is None:
             return
         try:
+            self._folder.mkdir(parents=True, exist_ok=True)
             observation = self.explorer.book.observation
             self.saved = save(observation, self._recording, folder=self._folder, name=self._name.value.strip())
         except Exception as error:  # noqa: BLE001 - an error in a callback would only reach a log that nobody reads
             self._say(sentence_of(error))
             return
-        self._said.value = "written: " + " and ".join(f"<code>{path.name}</code>" for path in self.saved)
+        self._said.value = "written: " + " and ".join(f"<code>{html.escape(str(path))}</code>" for path in self.saved)
 
-    def _look(self, path: str, masks: str, tell: Tell) -> Seen:
+    def _look(self, path: str, masks: str, *, tell: Tell) -> Seen:
         seen, self._recording = look_at(path, masks, tell)
         return seen
 
     def _uploaded(self, path: Path) -> None:
         self._path.value, self._masks.value = str(path), ""
         self._name.value = path.stem
-        self.open()
+        self.observe_now()
 
     def _changed(self) -> None:
         self._table.value = self._said.value = ""
@@ -263,6 +269,15 @@ def _button(words: str, icon: str, tooltip: str, act: Callable[[], object]) -> i
 def _as_table(table: "pd.DataFrame") -> str:
     """The most similar movies as an HTML table."""
     shown = table.head(_N_SHOWN)
-    named = shown.rename(columns={"temporal": "ψ_temporal in %", "spatial": "ψ_spatial in %"})
-    rounded = named[["ψ_temporal in %", "ψ_spatial in %"]].round(1)
-    return f"{rounded.to_html(escape=True, border=0)}<p>the first {len(shown)} of {len(table)} movies</p>"
+    cell = '<td style="padding: 0 0.8em; text-align: {}">{}</td>'
+    rows = [
+        cell.format("left", html.escape(str(name)))
+        + "".join(cell.format("right", f"{row[what]:.1f}") for what in _SHOWN)
+        for name, row in shown.iterrows()
+    ]
+    heads = "".join(f'<th style="padding: 0 0.8em">{head}</th>' for head in ("movie", *_SHOWN.values()))
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    return (
+        f'<table style="line-height: 1.5"><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>'
+        f"the first {len(shown)} of {len(table)} movies"
+    )

@@ -16,9 +16,9 @@ FOR_PAGES = "SEC_LAB_FOR_PAGES"
 SCRUBBER = "application/vnd.sec-lab.scrubber+html"
 """Kind of output that the report shows instead of a live widget."""
 
-MOST_BYTES = 4_500_000
-"""A page with one explorer stays below 5 MB."""
-_MOST_FRAMES, _MOST_WIDE = 120, 980
+MOST_BYTES = 3_500_000
+"""A page with an explorer and its figures stays below 5 MB."""
+_MOST_FRAMES, _MOST_WIDE = 150, 980
 _QUALITIES = (80, 65, 50)
 
 

@@ -152,6 +152,7 @@ def see(
     recording: Recording | str | os.PathLike[str] | None = None,
     segmentation: SegmentationMethod | Segmentation = "layers",
     how: How | None = None,
+    names: Names | None = None,
     tell: Tell | None = None,
 ) -> Seen:
     """Observe a movie, and keep its frames on the way.
@@ -167,6 +168,8 @@ def see(
     how : tuple, optional
         ``over_time`` and ``relations`` as of :func:`~sec_lab.pipeline.observe`, whose defaults stand if left out. Of an
         observation: how its relations were found, if it was neither of the ways that have a name.
+    names : mapping of int to str or None, optional
+        Names of segments; those that the source has if left out.
     tell : callable, optional
         Called after each frame with the number of frames so far and, where it is known, of all.
 
@@ -191,6 +194,8 @@ def see(
     if isinstance(source, Observation):
         frames = tuple(_kept(movie, source.segmentation, tell))
         background = None if source.segmentation is None else source.segmentation.background
+        if names is not None:
+            source = Observation(source.graphs, source.key_frames, names, source.position_unit, source.segmentation)
         return Seen(source, frames, how, background)
     if not isinstance(source, Segmentation):
         movie = source if isinstance(source, Recording) else Recording.open(source)
@@ -199,14 +204,15 @@ def see(
     keeper = _Keeper(tell)
     if movie is None:
         assert isinstance(labelled, Segmentation)
-        found = observe(keeper.tapped(labelled), over_time=how[0], relations=how[1])
+        found = observe(keeper.tapped(labelled), over_time=how[0], relations=how[1], names=names)
     else:
         if isinstance(labelled, Segmentation):
             check_fit(labelled, movie)
             method: Callable[[Recording], Segmentation] = partial(_beside, labelled)
         else:
             method = segmenter(labelled)
-        found = observe(movie, segmentation=partial(keeper.segment, method), over_time=how[0], relations=how[1])
+        segment = partial(keeper.segment, method)
+        found = observe(movie, segmentation=segment, over_time=how[0], relations=how[1], names=names)
     kept = tuple(keeper.frames)
     assert found.segmentation is not None
     background = found.segmentation.background

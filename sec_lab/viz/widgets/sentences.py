@@ -23,11 +23,9 @@ def as_alert(sentence: str) -> str:
     Examples
     --------
     >>> as_alert("a < b.")
-    '<span role="alert" class="sec-lab-alert" style="color: #c4371d; font-weight: 600">a &lt; b.</span>'
+    '<span role="alert" class="sec-lab-alert" style="color: ...">a &lt; b.</span>'
     """
     if not sentence:
         return ""
-    return (
-        '<span role="alert" class="sec-lab-alert" style="color: #c4371d; font-weight: 600">'
-        f"{html.escape(sentence)}</span>"
-    )
+    style = "color: var(--jp-error-color1, #c4371d); font-weight: 600"
+    return f'<span role="alert" class="sec-lab-alert" style="{style}">{html.escape(sentence)}</span>'

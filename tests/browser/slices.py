@@ -1,0 +1,55 @@
+"""The cells of a notebook that a widget needs, so that a page need not execute all of it."""
+
+import ast
+import builtins
+
+from nbformat import NotebookNode
+
+TAG = "nbval-ignore-output"
+
+
+def widget_cells(notebook: NotebookNode) -> list[int]:
+    """Indices of the code cells that show live widgets; views of servers are none."""
+    return [
+        place
+        for place, cell in enumerate(notebook.cells)
+        if cell.cell_type == "code" and TAG in cell.metadata.get("tags", [])
+    ]
+
+
+def needed_cells(notebook: NotebookNode, place: int) -> list[str]:
+    """Sources of the cells that bind what a cell uses, directly or not, in their order, and of the cell itself."""
+    wanted = _used(notebook.cells[place].source)
+    sources = [notebook.cells[place].source]
+    for cell in reversed(notebook.cells[:place]):
+        if cell.cell_type == "code" and _bound(cell.source) & wanted:
+            sources.insert(0, cell.source)
+            wanted |= _used(cell.source)
+    return sources
+
+
+def _names(source: str, context: type[ast.expr_context]) -> set[str]:
+    return {
+        node.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name) and isinstance(node.ctx, context)
+    }
+
+
+def _used(source: str) -> set[str]:
+    return _names(source, ast.Load) - set(dir(builtins))
+
+
+def _bound(source: str) -> set[str]:
+    """Names that a cell binds, or whose content it changes by an index."""
+    bound = _names(source, ast.Store)
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            bound |= {(alias.asname or alias.name).split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.FunctionDef):
+            bound.add(node.name)
+        elif isinstance(node, ast.Subscript | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            inner = node.value
+            while isinstance(inner, ast.Subscript | ast.Attribute):
+                inner = inner.value
+            if isinstance(inner, ast.Name):
+                bound.add(inner.id)
+    return bound
