@@ -286,6 +286,7 @@ BAD: dict[str, tuple[Callable[[], Explorer], str]] = {
     "names": (lambda: match_explorer(LIFTING, LIFTING, row_names="words"), "row_names: expected one of"),
     "frame": (lambda: segmentation_explorer(scene()[0], frame=3), "frame: expected one from 0 to 2, got 3"),
     "pictures": (lambda: match_explorer(LIFTING, LIFTING, pictures=([], {})), "pictures: expected two mappings"),
+    "no pictures": (lambda: match_explorer(LIFTING, LIFTING, pictures={}), "pictures: expected two mappings"),
     "table": (lambda: table_explorer([[1, 2], [3, 4]]), "table: expected a table with names"),
     "classes": (lambda: table_explorer(demonstrations()[0], classes=["a"]), "classes: expected one for each of 8"),
     "learning": (lambda: learning_explorer([LIFTING]), "expected at least two demonstrations, got 1"),

@@ -79,7 +79,7 @@ class MatchExplorer(Explorer):
         """Show another pair; parameters and errors are those of :func:`match_explorer`."""
         self._pair = chain_of(one, "one"), chain_of(other, "other")
         self._titles = titles
-        self._pictures = _addresses(pictures[0]), _addresses(pictures[1])
+        self._pictures = _addresses(pictures)
         self._compare_pair()
 
     @property
@@ -167,7 +167,8 @@ def match_explorer(
     )  # fmt: skip
 
 
-def _addresses(pictures: Pictures) -> dict[int, str]:
-    if not isinstance(pictures, Mapping):
+def _addresses(pictures: tuple[Pictures, Pictures]) -> tuple[dict[int, str], dict[int, str]]:
+    if not isinstance(pictures, Sequence) or len(pictures) != 2 or not all(isinstance(of, Mapping) for of in pictures):
         raise TypeError(f"pictures: expected two mappings of segments to pictures, got {type(pictures).__name__}")
-    return {int(segment): data_address(picture) for segment, picture in pictures.items()}
+    one, other = ({int(segment): data_address(picture) for segment, picture in of.items()} for of in pictures)
+    return one, other
