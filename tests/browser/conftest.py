@@ -139,11 +139,15 @@ def _wait_for(address: str, server: "subprocess.Popen[bytes]", log: Path) -> Non
 
 
 @pytest.fixture
-def lab(running_lab: Lab) -> Iterator[Lab]:
+def lab(running_lab: Lab, request: pytest.FixtureRequest) -> Iterator[Lab]:
     """The running lab; pages that the test opens are closed after it, their kernels shut down, and complaints told."""
-    before = len(running_lab.pages)
+    before, failed_before = len(running_lab.pages), request.session.testsfailed
     yield running_lab
     complaints = []
+    if request.session.testsfailed > failed_before:
+        # What the last page looked like, for whoever has to find out why.
+        SCREENS.mkdir(parents=True, exist_ok=True)
+        running_lab.pages[-1][0].screenshot(path=SCREENS / "failed.png")
     for page, said in running_lab.pages[before:]:
         complaints += said
         page.evaluate("() => void jupyterapp.serviceManager.sessions.shutdownAll()")

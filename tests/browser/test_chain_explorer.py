@@ -134,7 +134,9 @@ def test_every_control_does_what_it_says(lab: Lab, screenshot: Callable[..., Pat
     assert "2 bowl" in listed(page)
 
     # Two segments become one, and the chain changes; undo brings it back.
+    before = drawn(frame)
     page.locator(".sec-lab-explorer select").select_option(index=[1, 2])
+    wait_drawn(page, frame, before)
     page.get_by_role("button", name="merge").click()
     page.wait_for_function("document.querySelectorAll('.sec-lab-explorer select option').length === 3")
     page.get_by_role("button", name="undo").click()

@@ -89,7 +89,10 @@ def test_upload_stop_explore_compare_and_save(lab: Lab, screenshot: Callable[...
     page.locator(".sec-lab-explorer .widget-label", has_text="frame 16 ·").wait_for()
 
     # Two marks at the rim are parts of the table; merging runs beside the notebook.
+    frame = page.get_by_role("img", name="frame with")
+    before = frame.get_attribute("data-drawn")
     page.locator(".sec-lab-explorer select").select_option(index=[0, 1, 2])
+    page.wait_for_function("([c, n]) => c.dataset.drawn !== n", arg=[frame.element_handle(), before])
     button(page, "merge").click()
     page.wait_for_function("document.querySelectorAll('.sec-lab-explorer select option').length === 4")
 

@@ -1,6 +1,4 @@
-"""The picture that takes clicks and keys, in JupyterLab and in Notebook 7."""
-
-import pytest
+"""The picture that takes clicks and keys, which are none of the notebook's."""
 
 from tests.browser.conftest import Lab
 
@@ -25,9 +23,8 @@ ipywidgets.VBox([picture, told])
 """
 
 
-@pytest.mark.parametrize("front", ["lab", "notebook"])
-def test_clicks_and_keys_reach_the_kernel_and_the_picture_changes(lab: Lab, front: str) -> None:
-    page = lab.open(PICTURE, front=front)
+def test_clicks_and_keys_reach_the_kernel_and_the_picture_changes(lab: Lab) -> None:
+    page = lab.open(PICTURE)
     picture = page.get_by_role("img", name="a blue field")
     told = page.locator(".widget-label")
     blue = "canvas => canvas.getContext('2d').getImageData(3, 3, 1, 1).data[2]"

@@ -177,9 +177,10 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
 
     def _laid_out(self) -> ipywidgets.Widget:
         row = partial(ipywidgets.HBox, layout={"flex_flow": "row wrap", "align_items": "center"})
-        ways = row([self._play, self._back, self._next, self._place, self._told])
+        ways = row([self._play, self._back, self._next, self._place])
         naming = ipywidgets.VBox([row([self._name, self._rename]), row([self._merge, self._undo])])
-        return ipywidgets.VBox([self._frame, ways, self._chain, row([self._segments, naming])])
+        # The words have a line of their own, so that nothing moves when they grow.
+        return ipywidgets.VBox([self._frame, ways, self._told, self._chain, row([self._segments, naming])])
 
     def _button(self, words: str, icon: str, tooltip: str, act: Callable[[ChainBook], object]) -> ipywidgets.Button:
         width = "110px" if words else "42px"
