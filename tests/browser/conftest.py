@@ -92,6 +92,13 @@ class Lab:
         assert not errors.count(), errors.first.inner_text()
         return page
 
+    def execute(self, page: Page, source: str) -> None:
+        """Execute something in the kernel of a page, from outside its cells."""
+        page.evaluate(
+            "(code) => void jupyterapp.shell.currentWidget.sessionContext.session.kernel.requestExecute({ code })",
+            source,
+        )
+
 
 @pytest.fixture(scope="session")
 def running_lab(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:

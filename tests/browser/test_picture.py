@@ -40,3 +40,35 @@ def test_clicks_and_keys_reach_the_kernel_and_the_picture_changes(lab: Lab) -> N
         page.get_by_text(f"key {name}.", exact=True).wait_for()
     # None of the keys was a command of the notebook.
     assert page.locator(".jp-CodeCell").count() == 1
+
+
+MANY = """
+import time
+noise = np.random.default_rng(0).integers(0, 255, (100, 100, 3), dtype=np.uint8)
+for number in range(1000):
+    noise[0, 0] = number // 4
+    picture.png = cv2.imencode(".png", noise)[1].tobytes()
+    # As fast as a hand can, rather than all at once.
+    time.sleep(0.002)
+told.value = "all sent"
+"""
+
+
+def test_a_thousand_pictures_leave_nothing_behind_in_the_page(lab: Lab) -> None:
+    page = lab.open(PICTURE)
+    page.wait_for_selector("canvas[data-drawn]")
+    devtools = page.context.new_cdp_session(page)
+
+    def in_use() -> float:
+        devtools.send("HeapProfiler.collectGarbage")
+        usage = devtools.send("Runtime.getHeapUsage")
+        return float(sum(usage[part] for part in ("usedSize", "embedderHeapUsedSize", "backingStorageSize")))
+
+    before = in_use()
+    lab.execute(page, MANY)
+    page.get_by_text("all sent", exact=True).wait_for(timeout=60_000)
+    page.wait_for_function(
+        "document.querySelector('canvas').getContext('2d').getImageData(0, 0, 1, 1).data[0] === 999 >> 2"
+    )
+    # Each of them is a file of 30 kB and a picture of 40 kB.
+    assert in_use() - before < 10_000_000
