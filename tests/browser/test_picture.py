@@ -46,7 +46,7 @@ MANY = """
 import time
 noise = np.random.default_rng(0).integers(0, 255, (100, 100, 3), dtype=np.uint8)
 for number in range(1000):
-    noise[0, 0] = number // 4
+    noise[0, 0], noise[0, 1] = number // 4, number % 4
     picture.png = cv2.imencode(".png", noise)[1].tobytes()
     # As fast as a hand can, rather than all at once.
     time.sleep(0.002)
