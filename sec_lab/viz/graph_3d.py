@@ -72,7 +72,7 @@ class Scene3D:
     @property
     def node_radius(self) -> float:
         """Radius of the spheres, in the unit of the positions."""
-        return _RADIUS * _extent(self)
+        return _RADIUS * _extent(self.positions.reshape(-1, 3))
 
 
 def scene_3d(observation: Observation) -> Scene3D:
@@ -149,7 +149,7 @@ def put_graph(
         raise ValueError(f"parts: expected segments out of {scene.segments.tolist()}, got {unknown[0]}")
     visualizer["graph"].delete()
     _set_stage(visualizer)
-    visualizer["graph"].set_transform(_view(scene))
+    visualizer["graph"].set_transform(_view(_corners(scene, shapes)))
     animation = Animation(default_framerate=frames_per_second)
     times = _times(scene)
     radius = scene.node_radius
@@ -365,19 +365,26 @@ def _times(scene: Scene3D) -> list[float]:
     return [float(frame - scene.key_frames[0]) for frame in scene.key_frames]
 
 
-def _extent(scene: Scene3D) -> float:
-    """Largest side of the box around all positions."""
-    places = scene.positions.reshape(-1, 3)
+def _corners(scene: Scene3D, shapes: Parts) -> NDArray[np.float64]:
+    """Positions of all segments at all times, and the corners of the boxes around their shapes, (n, 3)."""
+    places = [scene.positions.reshape(-1, 3)]
+    for i, label in enumerate(scene.segments.tolist()):
+        if label in shapes:
+            places += [scene.positions[:, i] + corner for corner in np.asarray(shapes[label].bounds)]
+    return np.concatenate(places)
+
+
+def _extent(places: NDArray[np.float64]) -> float:
+    """Largest side of the box around some places."""
     side = float((places.max(axis=0) - places.min(axis=0)).max()) if len(places) else 0.0
     return side if side > 0 else 1.0
 
 
-def _view(scene: Scene3D) -> NDArray[np.float64]:
+def _view(places: NDArray[np.float64]) -> NDArray[np.float64]:
     """From right, down, away to meshcat's right, away, up, around the middle, at a size that fits the view."""
-    places = scene.positions.reshape(-1, 3)
     middle = (places.max(axis=0) + places.min(axis=0)) / 2
     turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-    scale = _VIEW_SIZE / _extent(scene)
+    scale = _VIEW_SIZE / _extent(places)
     matrix = np.eye(4)
     matrix[:3, :3] = scale * turn
     matrix[:3, 3] = -scale * turn @ middle

@@ -6,6 +6,7 @@ import builtins
 from nbformat import NotebookNode
 
 TAG = "nbval-ignore-output"
+_COMPREHENSIONS = ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp
 
 
 def widget_cells(notebook: NotebookNode) -> list[int]:
@@ -29,9 +30,17 @@ def needed_cells(notebook: NotebookNode, place: int) -> list[str]:
 
 
 def _names(source: str, context: type[ast.expr_context]) -> set[str]:
-    return {
-        node.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name) and isinstance(node.ctx, context)
-    }
+    return _names_in(ast.parse(source), context, frozenset())
+
+
+def _names_in(node: ast.AST, context: type[ast.expr_context], own: frozenset[str]) -> set[str]:
+    """Names in one part of a program; what a comprehension binds is its own."""
+    if isinstance(node, _COMPREHENSIONS):
+        targets = [one for part in node.generators for one in ast.walk(part.target)]
+        own = own | {one.id for one in targets if isinstance(one, ast.Name)}
+    is_one = isinstance(node, ast.Name) and isinstance(node.ctx, context) and node.id not in own
+    found = {node.id} if is_one and isinstance(node, ast.Name) else set()
+    return found.union(*(_names_in(child, context, own) for child in ast.iter_child_nodes(node)))
 
 
 def _used(source: str) -> set[str]:

@@ -5,9 +5,11 @@ import statistics
 from collections.abc import Callable
 from pathlib import Path
 
+import nbformat
 from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.conftest import Lab
+from tests.browser.slices import needed_cells
 
 CHAINS = """
 import numpy as np
@@ -247,3 +249,9 @@ def test_bad_input_is_a_sentence_and_the_notebook_lives_on(lab: Lab) -> None:
     )  # fmt: skip
     expect(page.locator(".sec-lab-alert").nth(1)).to_contain_text("no/such/movie.mp4: expected a movie")
     expect(page.locator(".jp-OutputArea-output").filter(has_text="42")).to_be_visible()
+
+
+def test_names_that_a_comprehension_binds_need_no_other_cell() -> None:
+    sources = ["for name in 'ab':\n    print(name)", "names = {name: 1 for name in 'ab'}", "[name for name in names]"]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in sources])
+    assert needed_cells(notebook, 2) == sources[1:]

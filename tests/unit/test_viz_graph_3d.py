@@ -123,6 +123,23 @@ def test_segments_may_have_shapes_of_their_own() -> None:
         commands(parts={3: box})
 
 
+def test_everything_fits_the_view_shapes_included() -> None:
+    box = trimesh.creation.box((4.0, 0.2, 0.3))
+    for parts in ({}, {TABLE: box}):
+        (sent,) = [
+            one for one in commands(parts=parts) if one["type"] == "set_transform" and one["path"] == "/meshcat/graph"
+        ]  # fmt: skip
+        matrix = np.array(sent["matrix"]).reshape(4, 4).T
+        places = scene_3d(observation()).positions.reshape(-1, 3)
+        if parts:
+            places = np.concatenate([places, [[-2.0, 0.2, 1.0], [2.0, 0.2, 1.0]]])
+        seen = places @ matrix[:3, :3].T + matrix[:3, 3]
+        assert np.isclose((seen.max(axis=0) - seen.min(axis=0)).max(), 2.0)
+        assert np.abs(seen).max() <= 1.0 + 1e-9
+        # What is down in the picture is down in the view.
+        assert matrix[2, 1] < 0
+
+
 def test_bad_input_is_refused() -> None:
     with pytest.raises(ValueError, match="frames_per_second: expected a number above 0, got 0"):
         commands(frames_per_second=0)

@@ -40,7 +40,7 @@ class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped
         self.progress = widgets.IntProgress(description="computing", max=1, style=LABELS)
         self.cancel = widgets.Button(description="Cancel", tooltip="stop what is being computed")
         self.work_bar = widgets.HBox([self.progress, self.cancel], layout={"visibility": "hidden"})
-        self.add_class("sec-lab-explorer")
+        self.add_class("sec-lab-controls")
 
     def __repr__(self) -> str:
         # Not all the drawings that are in it: notebooks store it.

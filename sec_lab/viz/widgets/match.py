@@ -7,6 +7,7 @@ import ipywidgets as widgets
 from numpy.typing import ArrayLike
 
 from sec_lab.similarity import EFFORT, Match, Normalizer, Permutation, TemporalInput, check_options, compare
+from sec_lab.viz.cells import RowNames
 from sec_lab.viz.exploring import Seen, chain_of
 from sec_lab.viz.svg.match import (
     listed_permutations,
@@ -38,10 +39,12 @@ class MatchExplorer(Explorer):
 
     def __init__(
         self, one: Seen, other: Seen, *, titles: tuple[str, str], pictures: tuple[Pictures, Pictures],
-        normalizer: Normalizer, tolerance_percent: float,
+        normalizer: Normalizer, tolerance_percent: float, row_names: RowNames = "relations",
     ) -> None:  # fmt: skip
         super().__init__()
         check_options(normalizer, tolerance_percent, "original", EFFORT)
+        if row_names not in get_args(RowNames):
+            raise ValueError(f"row_names: expected one of {get_args(RowNames)}, got {row_names!r}")
         self.normalizer = widgets.ToggleButtons(
             options=[(f"{word} row", word) for word in get_args(Normalizer)], value=normalizer,
             description="divide by the", style={**LABELS, "button_width": "auto"},
@@ -57,7 +60,7 @@ class MatchExplorer(Explorer):
             value=1, min=1, max=1, description="permutation (no.)", style=LABELS, layout=WIDE
         )
         self.names = widgets.ToggleButtons(
-            options=[("ρ", "relations"), ("names", "names")], description="rows as",
+            options=[("ρ", "relations"), ("names", "names")], value=row_names, description="rows as",
             style={**LABELS, "button_width": "auto"},
         )  # fmt: skip
         self.said = widgets.HTML()
@@ -76,7 +79,7 @@ class MatchExplorer(Explorer):
         """Show another pair; parameters and errors are those of :func:`match_explorer`."""
         self._pair = chain_of(one, "one"), chain_of(other, "other")
         self._titles = titles
-        self._pictures = _addresses(pictures[0]), _addresses(pictures[1])
+        self._pictures = _addresses(pictures)
         self._compare_pair()
 
     @property
@@ -125,6 +128,7 @@ def match_explorer(
     pictures: tuple[Pictures, Pictures] = ({}, {}),
     normalizer: Normalizer = "longer",
     tolerance_percent: float = 0.0,
+    row_names: RowNames = "relations",
 ) -> Explorer:
     """Look at two chains side by side: corresponding rows, aligned columns, similarities of rows, roles (§2.6, §2.8).
 
@@ -140,6 +144,8 @@ def match_explorer(
         Of segments of either chain; segments of one role are then shown as pairs of pictures.
     normalizer, tolerance_percent : optional
         Where the controls begin; see :func:`~sec_lab.similarity.compare`.
+    row_names : {"relations", "names"}, optional
+        Rows are called ρ2,1 at first, or by the names of their segments.
 
     Returns
     -------
@@ -156,11 +162,13 @@ def match_explorer(
     100
     """
     return MatchExplorer(
-        one, other, titles=titles, pictures=pictures, normalizer=normalizer, tolerance_percent=tolerance_percent
-    )
+        one, other, titles=titles, pictures=pictures, normalizer=normalizer, tolerance_percent=tolerance_percent,
+        row_names=row_names,
+    )  # fmt: skip
 
 
-def _addresses(pictures: Pictures) -> dict[int, str]:
-    if not isinstance(pictures, Mapping):
+def _addresses(pictures: tuple[Pictures, Pictures]) -> tuple[dict[int, str], dict[int, str]]:
+    if not isinstance(pictures, Sequence) or len(pictures) != 2 or not all(isinstance(of, Mapping) for of in pictures):
         raise TypeError(f"pictures: expected two mappings of segments to pictures, got {type(pictures).__name__}")
-    return {int(segment): data_address(picture) for segment, picture in pictures.items()}
+    one, other = ({int(segment): data_address(picture) for segment, picture in of.items()} for of in pictures)
+    return one, other

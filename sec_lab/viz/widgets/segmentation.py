@@ -52,17 +52,19 @@ class SegmentationExplorer(Explorer):
         The frame; beside it the segments, and the true ones where they are known.
     """
 
-    def __init__(self, recording: Movie, truth: Truth | None, *, parameters: PottsParameters) -> None:
+    def __init__(self, recording: Movie, truth: Truth | None, *, frame: int, parameters: PottsParameters) -> None:
         super().__init__()
         movie = _as_recording(recording)
         n_frames = _count(movie)
+        if not 0 <= frame < n_frames:
+            raise ValueError(f"frame: expected one from 0 to {n_frames - 1}, got {frame}")
         self._frames = FrameShelf(movie)
         self._movie, self._true = movie, None if truth is None else _as_labels(truth)
         self._truth = None if self._true is None else FrameShelf(self._true)
         self._kept = parameters
         self.frame = widgets.IntSlider(
-            min=0, max=n_frames - 1, description=f"frame (no. of {n_frames})", style=LABELS, disabled=n_frames == 1,
-            layout=WIDE,
+            value=frame, min=0, max=n_frames - 1, description=f"frame (no. of {n_frames})", style=LABELS,
+            disabled=n_frames == 1, layout=WIDE,
         )  # fmt: skip
         self.alpha = widgets.FloatSlider(
             value=parameters.alpha, min=0.1, max=10, step=0.1, description="α (of the mean colour difference)",
@@ -203,7 +205,7 @@ class SegmentationExplorer(Explorer):
 
 @never_raises
 def segmentation_explorer(
-    recording: Movie, truth: Truth | None = None, *, parameters: PottsParameters = DEFAULT
+    recording: Movie, truth: Truth | None = None, *, frame: int = 0, parameters: PottsParameters = DEFAULT
 ) -> Explorer:
     """Turn the knobs of superparamagnetic clustering on any frame of a movie (§2.2).
 
@@ -215,6 +217,8 @@ def segmentation_explorer(
         A movie, where to find one, or a single picture.
     truth : Segmentation, (n, height, width) or (height, width) array_like of int, optional
         True segments; the covering is then told.
+    frame : int, optional
+        Place of the frame that is shown first, from 0 on.
     parameters : PottsParameters, optional
         Where the controls begin.
 
@@ -232,7 +236,7 @@ def segmentation_explorer(
     >>> explorer.labels.max()
     np.uint16(2)
     """
-    return SegmentationExplorer(recording, truth, parameters=parameters)
+    return SegmentationExplorer(recording, truth, frame=frame, parameters=parameters)
 
 
 def _whole(description: str, value: int, low: int, high: int) -> widgets.IntSlider:

@@ -98,7 +98,7 @@ class TableExplorer(Explorer):
 
     def scrubbed(self) -> tuple[widgets.Widget, Sequence[Any]]:
         """The threshold, and where it can stand on a page without a kernel."""
-        return self.threshold, range(0, 101, 4)
+        return self.threshold, range(0, 101, 5)
 
     def _click(self, x: float, y: float) -> None:
         cell = cell_at(self._layout, x, y)
