@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sec_lab.codes import Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.observation import Observation
-from sec_lab.role_tables.history import SegmentHistory, held, segment_history, settled
+from sec_lab.role_tables.history import SegmentHistory, held, largest, segment_history, settled
 
 
 @dataclass(frozen=True)
@@ -70,16 +70,14 @@ def find_hand(recording: Observation | EventChain | SegmentHistory) -> Hand:
         return Hand(None, "nothing ever touches")
     away_at_first, away_at_last = ~history.present[:, 0], ~history.present[:, -1]
     come_or_go = away_at_first | away_at_last
-    for candidates, reason in (
-        (away_at_first & away_at_last, "absent at first and at last"),
-        (come_or_go & _acts(history, touching), "absent at first or at last"),
-    ):
-        if (candidates & touches).any():
-            how, values = _activity(history, touching)
-            values = np.where(candidates & touches, values, -1.0)
-            equal = np.flatnonzero(np.isclose(values, values.max(), rtol=1e-12, atol=0.0))
-            order, doubt = settled(history, equal.tolist())
-            return Hand(history.members[order[0]][0], f"{reason}, {how}", doubt)
+    candidates, reason = away_at_first & away_at_last & touches, "absent at first and at last"
+    if not candidates.any():
+        candidates, reason = come_or_go & _acts(history, touching), "absent at first or at last"
+    if candidates.any():
+        how, values = _activity(history, touching)
+        equal = candidates & largest(np.where(candidates, values, 0.0))
+        order, doubt = settled(history, np.flatnonzero(equal).tolist())
+        return Hand(history.members[order[0]][0], f"{reason}, {how}", doubt)
     if not come_or_go.any():
         return Hand(None, "no segment comes or goes")
     if not (come_or_go & touches).any():

@@ -97,6 +97,18 @@ def held(values: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
     return filled
 
 
+def largest(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which numbers, none of them negative, are the largest, but for rounding; (n,) bool.
+
+    Examples
+    --------
+    >>> largest(np.array([0.3, 0.1 + 0.2, 0.2]))
+    array([ True,  True, False])
+    """
+    most: NDArray[np.bool_] = values >= values.max() * (1 - 1e-12)
+    return most
+
+
 _SETTLED_BY = ("it touched first", "by its place", "by what else it does", "by its label alone")
 
 

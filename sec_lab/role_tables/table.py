@@ -13,7 +13,7 @@ from sec_lab.event_chain import EventChain, Names
 from sec_lab.observation import Observation
 from sec_lab.role_tables.cleaning import Cleaning, clean
 from sec_lab.role_tables.hand import find_hand
-from sec_lab.role_tables.history import SegmentHistory, segment_history, settled, time_shares
+from sec_lab.role_tables.history import SegmentHistory, largest, segment_history, settled, time_shares
 from sec_lab.role_tables.motion import up_direction, vertical_share
 
 if TYPE_CHECKING:
@@ -287,7 +287,7 @@ def _roles(history: SegmentHistory) -> tuple[list[int | None], dict[str, str]]:
         alone = len(history.members[0]) == 1
         why = "the hand touches nothing" if alone else "all that touches the hand comes and goes with it"
         return at, {ROLES[1]: why, **dict.fromkeys(ROLES[2:], "there is no object 1")}
-    equal = np.flatnonzero(np.isclose(held, held.max(), rtol=1e-12, atol=0.0))
+    equal = np.flatnonzero(largest(held))
     order, why = settled(history, equal.tolist(), partner=0)
     first, doubts = order[0], {1: why}
     second, doubts[2] = _worked_on(history, first, others=(0, first))
@@ -323,7 +323,6 @@ def _worked_on(history: SegmentHistory, segment: int, *, others: tuple[int, ...]
     in_touch = change & ~(both[:, 1:] & both[:, :-1])
     best = touched
     for values in (change.sum(axis=1), in_touch.sum(axis=1), touching @ history.shares):
-        values = np.where(best, values, -1.0)
-        best = best & np.isclose(values, values.max(), rtol=1e-12, atol=0.0)
+        best = best & largest(np.where(best, values, 0))
     order, why = settled(history, np.flatnonzero(best).tolist(), partner=segment)
     return order[0], why
