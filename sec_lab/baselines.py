@@ -432,7 +432,7 @@ def _checked_chains(chains: Chains) -> Chains:
 
 
 def _is_count(n: object) -> bool:
-    return isinstance(n, int | np.integer) and not isinstance(n, bool) and n >= 1
+    return isinstance(n, int | np.integer) and not isinstance(n, bool) and bool(n >= 1)
 
 
 def _check_chains(chains: Chains) -> None:

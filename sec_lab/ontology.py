@@ -16,6 +16,7 @@ import numpy as np
 
 from sec_lab.codes import Relation
 from sec_lab.role_tables import RoleTable
+from sec_lab.role_tables.table import as_role_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,6 +104,11 @@ def decide(table: RoleTable) -> Decision:
     Decision
         ``unknown``, with the reason, if there is no hand or it touches nothing.
 
+    Raises
+    ------
+    ValueError
+        If it is no role table.
+
     Examples
     --------
     >>> from sec_lab.event_chain import EventChain
@@ -115,6 +121,7 @@ def decide(table: RoleTable) -> Decision:
     1–2: touching at the beginning, apart at the end
     → take apart: a thing is taken off another one
     """
+    as_role_table(table)
     steps: list[str] = []
 
     def end(leaf: str, *reasons: str) -> Decision:
@@ -166,8 +173,20 @@ def decision_table(tables: Mapping[str, RoleTable], classes: "Classes") -> "pd.D
     Raises
     ------
     ValueError
-        If there is not one class for each recording.
+        If there is no recording, one of them is no role table, or there is not one class for each.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> from sec_lab.role_tables import role_table
+    >>> seen = EventChain([[9, 0, 2, 2, 0, 9], [9, 0, 0, 0, 0, 9], [2, 2, 2, 0, 0, 0]], [(7, 1), (7, 2), (2, 1)])
+    >>> decision_table({"one": role_table(seen)}, ["taking"])["take apart"]
+    class
+    taking    1
+    Name: take apart, dtype: int64
     """
+    if not isinstance(tables, Mapping) or not tables:
+        raise ValueError(f"tables: expected a mapping with at least one role table, got {type(tables).__name__}")
     import pandas as pd
 
     types = np.asarray(classes)

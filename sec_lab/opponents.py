@@ -219,6 +219,14 @@ def positives(study: OpponentStudy, classifier: str) -> "pd.DataFrame":
     ------
     ValueError
         If there is no such classifier.
+
+    Examples
+    --------
+    >>> known, answers = np.array([0, 0, 1, 1]), {"one": [[0, 0, 1, 0]], "other": [[1, 1, 1, 1]]}
+    >>> outputs = {name: np.eye(2)[np.array(said)] for name, said in answers.items()}
+    >>> study = OpponentStudy(("a", "b"), np.array([0.1]), known, answers, outputs)
+    >>> positives(study, "one").loc[0.1, "a"].to_dict()
+    {'TP': 100.0, 'FP': 50.0}
     """
     import pandas as pd
 
@@ -233,7 +241,16 @@ def positives(study: OpponentStudy, classifier: str) -> "pd.DataFrame":
 
 
 def right_percent(study: OpponentStudy) -> "pd.DataFrame":
-    """Share of right answers in percent, one row a level, one column a classifier."""
+    """Share of right answers in percent, one row a level, one column a classifier.
+
+    Examples
+    --------
+    >>> known, answers = np.array([0, 0, 1, 1]), {"one": [[0, 0, 1, 0]], "other": [[1, 1, 1, 1]]}
+    >>> outputs = {name: np.eye(2)[np.array(said)] for name, said in answers.items()}
+    >>> study = OpponentStudy(("a", "b"), np.array([0.1]), known, answers, outputs)
+    >>> right_percent(study).loc[0.1].to_dict()
+    {'one': 75.0, 'other': 50.0}
+    """
     import pandas as pd
 
     right = {name: 100.0 * (answers == study.known).mean(axis=1) for name, answers in study.answers.items()}
@@ -259,6 +276,14 @@ def paired_test(study: OpponentStudy, one: str, other: str) -> "pd.DataFrame":
     ------
     ValueError
         If there is no such classifier.
+
+    Examples
+    --------
+    >>> known, answers = np.array([0, 0, 1, 1]), {"one": [[0, 0, 1, 0]], "other": [[1, 1, 1, 1]]}
+    >>> outputs = {name: np.eye(2)[np.array(said)] for name, said in answers.items()}
+    >>> study = OpponentStudy(("a", "b"), np.array([0.1]), known, answers, outputs)
+    >>> paired_test(study, "one", "other").loc[0.1, ["only one", "only other", "chance"]].tolist()
+    [2.0, 1.0, 1.0]
     """
     import pandas as pd
     from scipy.stats import binomtest

@@ -19,6 +19,7 @@ from sec_lab.codes import Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.observation import Observation
 from sec_lab.role_tables import ROLES, ROWS, Cleaning, Compressed, RoleTable, role_similarity, role_table
+from sec_lab.role_tables.table import as_role_table
 
 Recording = RoleTable | Observation | EventChain
 
@@ -67,6 +68,11 @@ def role_features(table: RoleTable, *, most_counted: int = _MOST_COUNTED) -> NDA
     -------
     (96,) float64
 
+    Raises
+    ------
+    ValueError
+        If it is no role table, or changes are counted up to less than 1.
+
     Examples
     --------
     >>> from sec_lab.role_tables import role_table
@@ -75,6 +81,7 @@ def role_features(table: RoleTable, *, most_counted: int = _MOST_COUNTED) -> NDA
     >>> found["hand – object 1 from 0 to 2"], found["hand – object 1: share of time in touch"]
     (1.0, 0.2)
     """
+    as_role_table(table)
     if most_counted < 1:
         raise ValueError(f"most_counted: expected at least 1, got {most_counted}")
     shares = table.shares
@@ -180,7 +187,7 @@ class RoleTableClassifier(ClassifierMixin, BaseEstimator):
         found: NDArray[Any] = np.full(len(usable), self.without_hand, dtype=object)
         if usable.any():
             found[usable] = self.classes_[self._scores(features[usable]).argmax(axis=1)]
-        return found if self.classes_.dtype == object else np.array(found.tolist())
+        return _in_one_array(found.tolist(), self.classes_.dtype, self.without_hand)
 
     def predict_proba(self, X: Sequence[Recording]) -> NDArray[np.float64]:
         """Probability of each class, shape (n, n_classes); equal ones for a recording without a hand."""
@@ -276,13 +283,24 @@ class RoleTableNeighbour(ClassifierMixin, BaseEstimator):
         found = [
             self._nearest(table) if good else self.without_hand for table, good in zip(tables, usable, strict=True)
         ]
-        return np.array(found, dtype=None if found else self.classes_.dtype)
+        return _in_one_array(found, self.classes_.dtype, None if usable.all() else self.without_hand)
 
     def _nearest(self, table: RoleTable) -> Any:
         similar = np.array([role_similarity(table, other, compressed=self.compressed) for other in self.tables_])
         nearest = np.flatnonzero(similar >= similar.max() - 1e-9)
         counts = {one: int((self.known_[nearest] == one).sum()) for one in dict.fromkeys(self.known_[nearest].tolist())}
         return max(counts, key=lambda one: counts[one])
+
+
+def _in_one_array(answers: list[Any], classes: np.dtype[Any], without_hand: object) -> NDArray[Any]:
+    """Answers as they are: of the type of the classes, unless the answer without a hand is of another kind."""
+    if not answers or without_hand is None:
+        return np.array(answers, dtype=classes)
+    if np.asarray(without_hand).dtype.kind != classes.kind:
+        mixed: NDArray[Any] = np.empty(len(answers), dtype=object)
+        mixed[:] = answers
+        return mixed
+    return np.array(answers)
 
 
 def _tables(X: Sequence[Recording], *, hands: Sequence[int | str] | None, cleaning: Cleaning) -> list[RoleTable]:

@@ -4,9 +4,9 @@ Whatever can be chosen (a step of cleaning, a strength of regularisation) is cho
 judged, by those that are not judged: a nested run. Folds are made without chance, so a run is the same every time.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from sklearn import config_context
 from sklearn.base import clone
 
 from sec_lab.classification import Classes, leave_one_out
+from sec_lab.event_chain import EventChain
 from sec_lab.observation import Observation
 from sec_lab.recognition import rate
 from sec_lab.role_classifier import RoleTableClassifier
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 _LEAST_PROBABILITY = 1e-12
 
 Option = tuple[RoleTableClassifier, Sequence[RoleTable]]
+Step = TypeVar("Step")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,11 @@ class NestedAnswers:
 
 
 def nested_neighbours(
-    similarities: Mapping[str, ArrayLike], classes: Classes, *, groups: "Classes | None" = None
+    similarities: Mapping[str, ArrayLike],
+    classes: Classes,
+    *,
+    groups: "Classes | None" = None,
+    progress: bool = False,
 ) -> NestedAnswers:
     """Nearest neighbours, each by the table that serves best among the others.
 
@@ -60,6 +66,8 @@ def nested_neighbours(
         What each recording shows.
     groups : (n,) array_like, optional
         What is left out together, e.g. all recordings of one person; each recording alone if left out.
+    progress : bool, optional
+        Show a progress bar.
 
     Raises
     ------
@@ -78,7 +86,7 @@ def nested_neighbours(
         raise ValueError("similarities: expected at least one option, got none")
     predicted: NDArray[Any] = types.copy()
     chosen = [""] * len(types)
-    for left in held_out:
+    for left in _watched(held_out, progress=progress):
         train = np.flatnonzero(~left)
         margins = {name: _mean_margin(table[np.ix_(train, train)], types[train]) for name, table in tables.items()}
         best = max(margins, key=lambda name: margins[name])
@@ -91,7 +99,12 @@ def nested_neighbours(
 
 
 def nested_classifier(
-    options: Mapping[str, Option], classes: Classes, *, groups: "Classes | None" = None, n_folds: int = 5
+    options: Mapping[str, Option],
+    classes: Classes,
+    *,
+    groups: "Classes | None" = None,
+    n_folds: int = 5,
+    progress: bool = False,
 ) -> NestedAnswers:
     """Answers of the classifier, each by the option that serves best among the others.
 
@@ -107,11 +120,25 @@ def nested_classifier(
         What is left out together, for judging and for choosing; each recording alone if left out.
     n_folds : int, optional
         Parts into which the others are divided to choose, unless there are groups.
+    progress : bool, optional
+        Show a progress bar.
 
     Raises
     ------
     ValueError
-        If there is no option, or an option has another number of tables than there are classes.
+        If there is no option, an option has another number of tables than there are classes, or there are fewer than
+        two parts.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> pairs = [(7, 1), (7, 2), (2, 1)]
+    >>> put = role_table(EventChain([[9, 0, 2, 2, 9], [9, 0, 0, 0, 9], [0, 0, 0, 2, 2]], pairs))
+    >>> take = role_table(EventChain([[9, 0, 2, 2, 9], [9, 0, 0, 0, 9], [2, 2, 2, 0, 0]], pairs))
+    >>> options = {f"C = {C}": (RoleTableClassifier(C=C), [put, take] * 3) for C in (0.3, 1.0)}
+    >>> found = nested_classifier(options, ["put", "take"] * 3, n_folds=2)
+    >>> found.predicted[:2].tolist(), found.chosen[0]
+    (['put', 'take'], 'C = 1.0')
     """
     types, held_out = _outer(classes, groups)
     if not options:
@@ -119,10 +146,12 @@ def nested_classifier(
     for name, (_, tables) in options.items():
         if len(tables) != len(types):
             raise ValueError(f"options: expected {len(types)} role tables in {name!r}, got {len(tables)}")
+    if not isinstance(n_folds, int | np.integer) or n_folds < 2:
+        raise ValueError(f"n_folds: expected a whole number of at least 2, got {n_folds!r}")
     parts = None if groups is None else np.asarray(groups)
     predicted: NDArray[Any] = types.copy()
     chosen = [""] * len(types)
-    for left in held_out:
+    for left in _watched(held_out, progress=progress):
         train = np.flatnonzero(~left)
         best = next(iter(options))
         if len(options) > 1:
@@ -137,18 +166,19 @@ def nested_classifier(
 
 
 def ingredient_table(
-    recordings: Mapping[str, Observation],
+    recordings: Mapping[str, Observation | EventChain],
     classes: Classes,
     *,
     cleanings: Mapping[str, Cleaning],
     strengths: Sequence[float] = (0.3, 1.0),
     nested: bool = True,
+    progress: bool = False,
 ) -> "pd.DataFrame":
     """What each way of cleaning changes, recordings being left out one at a time.
 
     Parameters
     ----------
-    recordings : mapping of str to Observation
+    recordings : mapping of str to Observation or EventChain
     classes : (n,) array_like
         What each recording shows.
     cleanings : mapping of str to Cleaning
@@ -157,6 +187,8 @@ def ingredient_table(
         Values of C that the nested run chooses from; the other run takes the default.
     nested : bool, optional
         Run the nested choice of C too. It takes longest, so here one recording of each class is left out at a time.
+    progress : bool, optional
+        Show a progress bar.
 
     Returns
     -------
@@ -164,13 +196,34 @@ def ingredient_table(
         A row a cleaning: how many are recognised by their nearest neighbour (with rows compressed to changes, and with
         the compression chosen in a nested run), by the classifier, and by the classifier with a nested choice of C; of
         the last of these runs percent and Wilson interval.
+
+    Raises
+    ------
+    ValueError
+        If there is no recording or way of cleaning, or another number of classes than of recordings.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> pairs = [(7, 1), (7, 2), (2, 1)]
+    >>> put = EventChain([[9, 0, 2, 2, 9], [9, 0, 0, 0, 9], [0, 0, 0, 2, 2]], pairs)
+    >>> take = EventChain([[9, 0, 2, 2, 9], [9, 0, 0, 0, 9], [2, 2, 2, 0, 0]], pairs)
+    >>> seen = {f"{what} {n}": chain for n in range(3) for what, chain in (("put", put), ("take", take))}
+    >>> table = ingredient_table(seen, ["put", "take"] * 3, cleanings={"default": Cleaning()}, nested=False)
+    >>> table.loc["default", ["neighbour", "classifier", "percent"]].tolist()
+    [6.0, 6.0, 100.0]
     """
     import pandas as pd
 
+    for name, given in (("recordings", recordings), ("cleanings", cleanings)):
+        if not isinstance(given, Mapping) or not given:
+            raise ValueError(f"{name}: expected a mapping with at least one entry, got {type(given).__name__}")
     rows = {}
     types = np.asarray(classes)
+    if types.shape != (len(recordings),):
+        raise ValueError(f"classes: expected one for each of {len(recordings)} recordings, got shape {types.shape}")
     rounds = _folds(types, len(types))
-    for name, cleaning in cleanings.items():
+    for name, cleaning in _watched(list(cleanings.items()), progress=progress):
         tables = [role_table(one, cleaning=cleaning) for one in recordings.values()]
         similar = {way: role_similarity_table(tables, compressed=way) for way in get_args(Compressed)}
         row = {
@@ -200,6 +253,7 @@ def learning_curve(
     n_demonstrations: Sequence[int],
     n_draws: int,
     rng: np.random.Generator,
+    progress: bool = False,
 ) -> dict[int, NDArray[np.float64]]:
     """Percent recognised of all others, after few demonstrations of each class.
 
@@ -212,6 +266,8 @@ def learning_curve(
     n_draws : int
         How often demonstrations are drawn.
     rng : numpy.random.Generator
+    progress : bool, optional
+        Show a progress bar.
 
     Returns
     -------
@@ -220,13 +276,27 @@ def learning_curve(
     Raises
     ------
     ValueError
-        If a number leaves no recording to be judged, or a class has fewer recordings.
+        If a number leaves no recording to be judged, a class has fewer recordings, or nothing is drawn.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> pairs = [(7, 1), (7, 2), (2, 1)]
+    >>> put = role_table(EventChain([[9, 0, 2, 2, 9], [9, 0, 0, 0, 9], [0, 0, 0, 2, 2]], pairs))
+    >>> take = role_table(EventChain([[9, 0, 2, 2, 9], [9, 0, 0, 0, 9], [2, 2, 2, 0, 0]], pairs))
+    >>> option = RoleTableClassifier(), [put, take] * 3
+    >>> learning_curve(
+    ...     option, ["put", "take"] * 3, n_demonstrations=[1, 2], n_draws=2, rng=np.random.default_rng(0)
+    ... )
+    {1: array([100., 100.]), 2: array([100., 100.])}
     """
+    if not isinstance(n_draws, int | np.integer) or n_draws < 1:
+        raise ValueError(f"n_draws: expected a whole number of at least 1, got {n_draws!r}")
     types = np.asarray(classes)
     members = [np.flatnonzero(types == one) for one in dict.fromkeys(types.tolist())]
     fewest = min(len(one) for one in members)
     found = {}
-    for n in n_demonstrations:
+    for n in _watched(list(n_demonstrations), progress=progress):
         if not 1 <= n < fewest:
             raise ValueError(f"n_demonstrations: expected 1 to {fewest - 1}, got {n}")
         draws = []
@@ -236,6 +306,14 @@ def learning_curve(
             draws.append(100.0 * float((_answers(option, types, train, others) == types[others]).mean()))
         found[n] = np.array(draws)
     return found
+
+
+def _watched(steps: Sequence[Step], *, progress: bool) -> Iterable[Step]:
+    """The steps, with a progress bar if asked for."""
+    from tqdm import tqdm
+
+    bar: Iterable[Step] = tqdm(steps, unit="step", desc="judging", disable=not progress)
+    return bar
 
 
 def _outer(classes: Classes, groups: "Classes | None") -> tuple[NDArray[Any], list[NDArray[np.bool_]]]:

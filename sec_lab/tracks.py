@@ -19,6 +19,7 @@ from sec_lab.codes import Relation
 from sec_lab.files import UnusableFileError, read_whole
 from sec_lab.observation import Observation
 from sec_lab.relations.boxes import box_relations
+from sec_lab.role_tables.history import held
 from sec_lab.scene_graph import SceneGraph, main_graphs
 
 # Codes of a table of distances: touching, near, far.
@@ -49,7 +50,7 @@ def read_distance_table(path: str | os.PathLike[str], *, least_frames: int = 1) 
     UnusableFileError
         If there is no such file, or it is no such table.
     ValueError
-        If ``least_frames`` is below 1.
+        If ``least_frames`` is no whole number of at least 1.
 
     Examples
     --------
@@ -62,8 +63,7 @@ def read_distance_table(path: str | os.PathLike[str], *, least_frames: int = 1) 
            [0, 0, 0],
            [2, 2, 0]], dtype=uint8)
     """
-    if least_frames < 1:
-        raise ValueError(f"least_frames: expected at least 1, got {least_frames}")
+    _check_least(least_frames)
     expected = "a table of distances"
     content = read_whole(Path(path), expected=expected)
     try:
@@ -81,6 +81,11 @@ def read_distance_table(path: str | os.PathLike[str], *, least_frames: int = 1) 
         relations[first, second] = np.where(touching[:, frame], Relation.TOUCHING, Relation.NON_TOUCHING)
         graphs.append(SceneGraph(labels, relations + relations.T))
     return Observation(graphs, changes, dict(enumerate(names, 1)))
+
+
+def _check_least(least_frames: int) -> None:
+    if not isinstance(least_frames, int | np.integer) or isinstance(least_frames, bool) or least_frames < 1:
+        raise ValueError(f"least_frames: expected a whole number of at least 1, got {least_frames!r}")
 
 
 def _distances(lines: Sequence[str]) -> tuple[list[str], NDArray[np.bool_]]:
@@ -162,7 +167,27 @@ def read_box_take(path: str | os.PathLike[str], *, gap_m: float = 0.0, least_fra
     ------
     UnusableFileError
         If there is no such file, or it is no such take.
+    ValueError
+        If the gap is negative or not finite, or ``least_frames`` is below 1.
+
+    Examples
+    --------
+    >>> import gzip
+    >>> from tempfile import TemporaryDirectory
+    >>> hand, cup = ["hand_1", 0, 1, 0, 1, 0, 1], ["cup_1", 3, 4, 0, 1, 0, 1]
+    >>> near = ["hand_1", 2, 3, 0, 1, 0, 1]
+    >>> frames = {"0": {"objects": [hand, cup]}, "1": {"objects": [near, cup]}}
+    >>> truth = {"right_hand": [0, [1, None, "cup_1"], 2]}
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "take.json.gz"
+    ...     _ = path.write_bytes(gzip.compress(json.dumps({"frames": frames, "gt": truth}).encode()))
+    ...     take = read_box_take(path)
+    >>> take.observation.chain.relations, take.actions["right hand"]
+    (array([[0, 2]], dtype=uint8), ((0, 2, 'approach', 'cup_1'),))
     """
+    _check_least(least_frames)
+    if not 0 <= gap_m < np.inf:
+        raise ValueError(f"gap_m: expected a finite distance of at least 0, got {gap_m}")
     expected = "a take of boxes"
     packed = read_whole(Path(path), expected=expected)
     try:
@@ -189,11 +214,15 @@ def _take(frames: Mapping[int, Any], truth: Mapping[str, Any], *, gap_m: float, 
     n = len(names)
     boxes = np.full((len(numbers), n, 2, 3), np.nan)
     for k, number in enumerate(numbers):
+        shown_names = [str(box[0]) for box in frames[number]]
+        twice = [name for name in dict.fromkeys(shown_names) if shown_names.count(name) > 1]
+        if twice:
+            raise ValueError(f"expected each name once in a frame, got {twice[0]!r} again in frame {number}")
         for name, x0, x1, y0, y1, z0, z1 in frames[number]:
-            boxes[k, names.index(name)] = [[x0, y0, z0], [x1, y1, z1]]
+            boxes[k, names.index(str(name))] = [[x0, y0, z0], [x1, y1, z1]]
     there = ~np.isnan(boxes[:, :, 0, 0])
     shown = _steady(there.T.copy(), least_frames).T
-    boxes = _held(boxes, there)
+    boxes = held(boxes.swapaxes(0, 1), there.T).swapaxes(0, 1)
     first, second = np.triu_indices(n, k=1)
     found = [box_relations(boxes[k], segments=np.arange(1, n + 1), gap_m=gap_m) for k in range(len(numbers))]
     touching = np.array([one.relations[first, second] > 0 for one in found]).T
@@ -210,12 +239,12 @@ def _take(frames: Mapping[int, Any], truth: Mapping[str, Any], *, gap_m: float, 
     return BoxTake(observation, {hand.replace("_", " "): _actions(line) for hand, line in truth.items()})
 
 
-def _held(boxes: NDArray[np.float64], there: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Boxes with every absence filled by the last box before it, the first absence by the first box after it."""
-    at = np.where(there, np.arange(len(there))[:, None], -1)
-    at = np.maximum(np.maximum.accumulate(at, axis=0), there.argmax(axis=0))
-    held: NDArray[np.float64] = boxes[at, np.arange(boxes.shape[1])]
-    return held
+def _action(number: int | None) -> str:
+    if number is None:
+        return "none"
+    if not 0 <= int(number) < len(ACTIONS):
+        raise ValueError(f"expected actions 0 to {len(ACTIONS) - 1}, got {number}")
+    return ACTIONS[int(number)]
 
 
 def _actions(line: Sequence[Any]) -> tuple[tuple[int, int, str, str | None], ...]:
@@ -227,7 +256,7 @@ def _actions(line: Sequence[Any]) -> tuple[tuple[int, int, str, str | None], ...
         (
             int(start),
             int(end),
-            "none" if kind[0] is None else ACTIONS[int(kind[0])],
+            _action(kind[0]),
             None if kind[2] is None else str(kind[2]),
         )
         for start, end, kind in zip(starts, starts[1:], kinds, strict=False)

@@ -56,10 +56,20 @@ def hand(movie: Movie) -> int | None:
     touching = [a for a in labels if any(moment.code(a, b) == 2 for moment in movie for b in labels if b != a)]
     away = {a: (a not in movie[0].places, a not in movie[-1].places) for a in touching}
     for wanted in (all, any):
-        candidates = [a for a in touching if wanted(away[a])]
+        candidates = [a for a in touching if wanted(away[a]) and (wanted is all or acts(movie, a))]
         if len(labels) > 1 and candidates:
             return max(candidates, key=lambda a: (path(movie, a), -a))
     return None
+
+
+def acts(movie: Movie, label: int) -> bool:
+    """Whether a touch begins or ends between two moments in which both are there."""
+    return any(
+        (before.code(label, other) == 2) != (after.code(label, other) == 2)
+        for before, after in pairwise(movie)
+        for other in before.places
+        if other != label and {label, other} <= before.places.keys() & after.places.keys()
+    )
 
 
 def bridge(movie: Movie) -> Movie:
@@ -115,11 +125,17 @@ def untouched(movie: Movie) -> set[int]:
 
 
 def with_hand(movie: Movie, of: int, tolerance: float) -> list[int]:
-    """The hand and what joins it, in the order in which it joins."""
+    """The hand and what joins it."""
+    return [of, *(label for joining in with_hand_by_rounds(movie, of, tolerance) for label in joining)]
+
+
+def with_hand_by_rounds(movie: Movie, of: int, tolerance: float) -> list[list[int]]:
+    """What joins the hand, round by round."""
     shares = lasting(movie)
     since = [math.fsum(shares[:k]) for k in range(len(shares) + 1)]
-    group = [of]
+    group, rounds = [of], []
     while True:
+        joining = []
         for label in segments(movie):
             there = present(movie, label)
             if label in group or there[0] or there[-1]:
@@ -131,11 +147,12 @@ def with_hand(movie: Movie, of: int, tolerance: float) -> list[int]:
             both = math.fsum(share for share, a, b in zip(shares, there, grouped, strict=True) if a and b)
             shorter = min(life(movie, label), math.fsum(s for s, yes in zip(shares, grouped, strict=True) if yes))
             touches = any(moment.code(label, one) == 2 for moment in movie for one in group)
-            if together or (both >= 0.8 * shorter and touches):
-                group.append(label)
-                break
-        else:
-            return group
+            if together or (both >= 0.8 * shorter - 1e-12 and touches):
+                joining.append(label)
+        if not joining:
+            return rounds
+        rounds.append(joining)
+        group += joining
 
 
 def worked_on(movie: Movie, of: int, others: set[int]) -> int | None:

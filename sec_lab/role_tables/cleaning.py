@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab.codes import Relation
-from sec_lab.role_tables.history import SegmentHistory
+from sec_lab.role_tables.history import SegmentHistory, settled
 
 # Of the time that two segments share, or that the shorter-lived of them is there: enough to be called "always".
 _NEARLY_ALWAYS = 0.95
 _MOSTLY = 0.8
+# Sums of shares that are equal may differ by rounding, which may depend on the order of segments.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -119,10 +121,21 @@ def clean(history: SegmentHistory, *, hands: Sequence[int], cleaning: Cleaning) 
     ------
     ValueError
         If there is no hand, or it is not in the history.
+
+    Examples
+    --------
+    A hand (7) and its sleeve (8), a cup (1) and what nobody touches (2):
+
+    >>> from sec_lab.event_chain import EventChain
+    >>> from sec_lab.role_tables.history import segment_history
+    >>> rows = [[9, 2, 2, 9], [9, 0, 2, 9], [9, 0, 0, 9], [0, 0, 0, 0]]
+    >>> seen = segment_history(EventChain(rows, [(7, 8), (7, 1), (8, 1), (1, 2)]))
+    >>> clean(seen, hands=[7], cleaning=Cleaning()).members
+    ((7, 8), (1,))
     """
     if not len(hands):
         raise ValueError("hands: expected at least one segment, got none")
-    group = sorted({history.index_of(hand) for hand in hands}, key=lambda i: history.members[i] != (hands[0],))
+    group = list(dict.fromkeys(history.index_of(hand) for hand in hands))
     if cleaning.bridged:
         history = bridge_absences(history)
     history = merge(history, group)
@@ -216,7 +229,22 @@ def merge_with_hand(history: SegmentHistory, *, hand: int, tolerance_percent: fl
     -------
     SegmentHistory
         Its first segment is the hand.
+
+    Raises
+    ------
+    ValueError
+        If there is no such segment, or the tolerance is not from 0 to 100.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> from sec_lab.role_tables.history import segment_history
+    >>> rows = [[9, 2, 9], [9, 2, 9], [9, 0, 9], [0, 0, 0]]
+    >>> seen = segment_history(EventChain(rows, [(7, 8), (7, 1), (8, 1), (1, 2)]))
+    >>> merge_with_hand(seen, hand=7).members
+    ((7, 8), (1,), (2,))
     """
+    _check_percent(tolerance_percent, "tolerance_percent")
     present, shares = history.present, history.shares
     since = np.append(0.0, np.cumsum(shares))
     first = present.argmax(axis=1)
@@ -224,22 +252,36 @@ def merge_with_hand(history: SegmentHistory, *, hand: int, tolerance_percent: fl
     lives = present @ shares
     comes_and_goes = ~present[:, 0] & ~present[:, -1] & (lives > 0)
     touching = history.relations == Relation.TOUCHING
-    tolerance = tolerance_percent / 100
+    tolerance = tolerance_percent / 100 + _ROUNDING
     group = [history.index_of(hand)]
-    # One after the other, as each that joins may bring more.
+    # Again and again, as those that join may bring more; all at once, so that no order of the labels matters.
     while True:
         there: NDArray[np.bool_] = np.asarray(present[group].any(axis=0))
         if not there.any():
             break
         begin, end = int(there.argmax()), int(len(there) - 1 - there[::-1].argmax())
         with_it = (np.abs(since[first] - since[begin]) <= tolerance) | (np.abs(since[last] - since[end]) <= tolerance)
-        shared = (present & there) @ shares >= _MOSTLY * np.minimum(lives, there @ shares)
+        shared = (present & there) @ shares >= _MOSTLY * np.minimum(lives, there @ shares) - _ROUNDING
         joining = comes_and_goes & (with_it | (shared & touching[group].any(axis=(0, 2))))
         joining[group] = False
         if not joining.any():
             break
-        group.append(int(joining.argmax()))
+        group += _by_life(history, np.flatnonzero(joining).tolist())
     return merge(history, group)
+
+
+def _by_life(history: SegmentHistory, some: Sequence[int]) -> list[int]:
+    """Segments in the order of how long they are there, longest first."""
+    lives = (history.present[list(some)] @ history.shares).round(12).tolist()
+    order: list[int] = []
+    for life in sorted(set(lives), reverse=True):
+        order += settled(history, [i for i, other in zip(some, lives, strict=True) if other == life])[0]
+    return order
+
+
+def _check_percent(value: float, name: str) -> None:
+    if not 0 <= value <= 100:
+        raise ValueError(f"{name}: expected 0 to 100, got {value}")
 
 
 def drop_short_lived(history: SegmentHistory, *, hand: int, least_percent: float = 5.0) -> SegmentHistory:
@@ -252,8 +294,22 @@ def drop_short_lived(history: SegmentHistory, *, hand: int, least_percent: float
         Label.
     least_percent : float, optional
         Of the whole time.
+
+    Raises
+    ------
+    ValueError
+        If there is no such segment, or the share is not from 0 to 100.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> from sec_lab.role_tables.history import segment_history
+    >>> seen = segment_history(EventChain([[0, 0, 0], [0, 9, 9]], [(1, 2), (1, 3)], [0, 1, 50]))
+    >>> drop_short_lived(seen, hand=1).members
+    ((1,), (2,))
     """
-    kept = history.present @ history.shares >= least_percent / 100
+    _check_percent(least_percent, "least_percent")
+    kept = history.present @ history.shares >= least_percent / 100 - _ROUNDING
     kept[history.index_of(hand)] = True
     return _subset(history, kept)
 
@@ -264,8 +320,9 @@ def merge_moving_together(history: SegmentHistory, *, hand: int, most_percent: f
     Two segments are merged that touch whenever both are there, and whose places relative to each other hardly change.
     Without places nothing is merged.
 
-    # Departure: two segments that are both there at first stay apart even so. They were told apart before anything
-    # was done, so neither is a fragment of the other (a bowl and the liquid in it, a thing and the hand that holds it).
+    # Departure: two segments that are both there at first stay apart even so, unless both of them move. They were told
+    # apart before anything was done, so neither is a fragment of the other (a board and the cucumber on it); two that
+    # move as one all the time are one thing that was seen in two pieces.
 
     Parameters
     ----------
@@ -274,7 +331,25 @@ def merge_moving_together(history: SegmentHistory, *, hand: int, most_percent: f
         Label; the hand is not merged, as it touches and moves what it holds.
     most_percent : float, optional
         Largest change of their relative place, in percent of how far the hand gets from where it was first seen.
+
+    Raises
+    ------
+    ValueError
+        If there is no such segment, or the limit is not from 0 to 100.
+
+    Examples
+    --------
+    A box (1) and the part of it (2) that is seen as a segment of its own once a hand (7) pushes it:
+
+    >>> places = np.array([[[0, 0], [0, 0], [9, 0]], [[np.nan] * 2, [1, 0], [10, 0]], [[np.nan] * 2, [0, 5], [9, 5]]])
+    >>> present = ~np.isnan(places[..., 0])
+    >>> relations = np.zeros((3, 3, 3), np.uint8)
+    >>> relations[0, 1, 1:] = relations[1, 0, 1:] = relations[0, 2, 1:] = relations[2, 0, 1:] = 2
+    >>> seen = SegmentHistory(((1,), (2,), (7,)), present, relations, places, np.array([0, 10, 20]))
+    >>> merge_moving_together(seen, hand=7).members
+    ((1, 2), (7,))
     """
+    _check_percent(most_percent, "most_percent")
     places, present = history.places, history.present
     if places is None:
         return history
@@ -288,7 +363,7 @@ def merge_moving_together(history: SegmentHistory, *, hand: int, most_percent: f
     touched = (history.relations > 0) @ shares
     moves = _extents(places, present) > most_percent / 100 * reach
     apart_at_first = (at_first[:, None] & at_first) & ~(moves[:, None] & moves)
-    close = (shared > 0) & (touched >= _NEARLY_ALWAYS * shared) & ~apart_at_first
+    close = (shared > 0) & (touched >= _NEARLY_ALWAYS * shared - _ROUNDING) & ~apart_at_first
     close[at_hand] = close[:, at_hand] = False
     roots = np.arange(len(present))
     for i, j in np.argwhere(np.triu(close, k=1)).tolist():
@@ -298,8 +373,8 @@ def merge_moving_together(history: SegmentHistory, *, hand: int, most_percent: f
     if len(np.unique(roots)) == len(roots):
         return history
     # Within a group the one that is there longest gives the place.
-    order = np.argsort(-(present @ shares), kind="stable")
-    groups = [[int(i) for i in order if roots[i] == root] for root in dict.fromkeys(roots.tolist())]
+    order = _by_life(history, range(len(present)))
+    groups = [[i for i in order if roots[i] == root] for root in dict.fromkeys(roots.tolist())]
     return _merged(history, groups)
 
 

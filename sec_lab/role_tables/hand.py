@@ -1,6 +1,6 @@
 """The hand, found without knowing what a hand looks like."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sec_lab.codes import Relation
 from sec_lab.event_chain import EventChain
 from sec_lab.observation import Observation
-from sec_lab.role_tables.history import SegmentHistory, segment_history
+from sec_lab.role_tables.history import SegmentHistory, held, largest, segment_history, settled
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,13 @@ class Hand:
         Label of the segment, None if there is no hand.
     reason : str
         By what it was told, or what is missing.
+    doubt : str
+        Which segments are equal in what decides, and by what it was settled; empty if one is ahead.
     """
 
     segment: int | None
     reason: str
+    doubt: str = field(default="", repr=False)
 
 
 def find_hand(recording: Observation | EventChain | SegmentHistory) -> Hand:
@@ -32,8 +35,10 @@ def find_hand(recording: Observation | EventChain | SegmentHistory) -> Hand:
 
     A hand is not there at first and at last, touches something in between, and of all such segments moves along the
     longest path. Without places the one is taken that is there longest and touches and lets go most often (the
-    product of both). If the movie begins or ends too early to see the hand come or go, a segment that is absent at
-    one of both ends will do.
+    product of both). If the movie begins too late or ends too early to see the hand come or go, a segment that is
+    absent at one of both ends will do, if it touches or lets go of something while both are there: what appears in
+    touch and stays so (a liquid, a slice) does not act. Equal ones are settled by
+    :func:`~sec_lab.role_tables.history.settled`.
 
     Parameters
     ----------
@@ -43,7 +48,7 @@ def find_hand(recording: Observation | EventChain | SegmentHistory) -> Hand:
     Returns
     -------
     Hand
-        Without a segment if nothing comes or goes, or what does touches nothing.
+        Without a segment if nothing comes or goes, or what does touches nothing, or does not act.
 
     Raises
     ------
@@ -64,18 +69,20 @@ def find_hand(recording: Observation | EventChain | SegmentHistory) -> Hand:
     if not touches.any():
         return Hand(None, "nothing ever touches")
     away_at_first, away_at_last = ~history.present[:, 0], ~history.present[:, -1]
-    for candidates, reason in (
-        (away_at_first & away_at_last, "absent at first and at last"),
-        (away_at_first | away_at_last, "absent at first or at last"),
-    ):
-        if (candidates & touches).any():
-            how, values = _activity(history, touching)
-            best = int(np.argmax(np.where(candidates & touches, values, -1.0)))
-            return Hand(history.members[best][0], f"{reason}, {how}")
-    why = (
-        "no segment comes or goes" if not (away_at_first | away_at_last).any() else "what comes or goes touches nothing"
-    )
-    return Hand(None, why)
+    come_or_go = away_at_first | away_at_last
+    candidates, reason = away_at_first & away_at_last & touches, "absent at first and at last"
+    if not candidates.any():
+        candidates, reason = come_or_go & _acts(history, touching), "absent at first or at last"
+    if candidates.any():
+        how, values = _activity(history, touching)
+        equal = candidates & largest(np.where(candidates, values, 0.0))
+        order, doubt = settled(history, np.flatnonzero(equal).tolist())
+        return Hand(history.members[order[0]][0], f"{reason}, {how}", doubt)
+    if not come_or_go.any():
+        return Hand(None, "no segment comes or goes")
+    if not (come_or_go & touches).any():
+        return Hand(None, "what comes or goes touches nothing")
+    return Hand(None, "what comes or goes neither touches nor lets go of anything while it is there")
 
 
 def path_lengths(history: SegmentHistory) -> NDArray[np.float64]:
@@ -88,7 +95,7 @@ def path_lengths(history: SegmentHistory) -> NDArray[np.float64]:
     """
     if history.places is None:
         raise ValueError("places: expected those of all segments, got none")
-    filled = _held(history.places, history.present)
+    filled = held(history.places, history.present)
     steps: NDArray[np.float64] = np.sqrt((np.diff(filled, axis=1) ** 2).sum(axis=2)).sum(axis=1)
     return steps
 
@@ -100,9 +107,10 @@ def _activity(history: SegmentHistory, touching: NDArray[np.bool_]) -> tuple[str
     return "longest there and most often touching", (history.present @ history.shares) * (1.0 + changes)
 
 
-def _held(places: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Places with each absence filled by the last place before it, the first absence by the first place after it."""
-    at = np.where(present, np.arange(present.shape[1]), -1)
-    at = np.maximum(np.maximum.accumulate(at, axis=1), present.argmax(axis=1)[:, None])
-    held: NDArray[np.float64] = places[np.arange(len(places))[:, None], at]
-    return held
+def _acts(history: SegmentHistory, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which segments begin or end a touch while both are there, (n,) bool."""
+    changes = touching[..., 1:] != touching[..., :-1]
+    present = history.present
+    through = present[:, 1:] & present[:, :-1]
+    acts: NDArray[np.bool_] = (changes & through[:, None] & through).any(axis=(1, 2))
+    return acts

@@ -1,7 +1,8 @@
 """What every segment did in the course of one movie: the form in which cleaning steps take and give a recording."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,10 +48,9 @@ class SegmentHistory:
         for name in ("present", "relations", "places", "key_frames"):
             array = getattr(self, name)
             if array is not None:
-                # A view is protected, so that what is shared between steps needs no copy.
-                view = array.view()
-                view.setflags(write=False)
-                object.__setattr__(self, name, view)
+                copy = np.array(array)
+                copy.setflags(write=False)
+                object.__setattr__(self, name, copy)
 
     @property
     def shares(self) -> NDArray[np.float64]:
@@ -71,6 +71,97 @@ class SegmentHistory:
         raise ValueError(
             f"segment: expected one of {[label for labels in self.members for label in labels]}, got {segment}"
         )
+
+
+def held(values: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
+    """Values with each absence filled by the last one before it, the first absence by the first one after it.
+
+    Parameters
+    ----------
+    values : (n, n_key_frames, ...) array
+        One row a segment.
+    present : (n, n_key_frames) bool
+
+    Returns
+    -------
+    Array of the shape of the values.
+
+    Examples
+    --------
+    >>> held(np.array([[0, 5, 0, 7]]), np.array([[False, True, False, True]]))
+    array([[5, 5, 5, 7]])
+    """
+    at = np.where(present, np.arange(present.shape[1]), -1)
+    at = np.maximum(np.maximum.accumulate(at, axis=1), present.argmax(axis=1)[:, None])
+    filled: NDArray[Any] = values[np.arange(len(values))[:, None], at]
+    return filled
+
+
+def largest(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which numbers, none of them negative, are the largest, but for rounding; (n,) bool.
+
+    Examples
+    --------
+    >>> largest(np.array([0.3, 0.1 + 0.2, 0.2]))
+    array([ True,  True, False])
+    """
+    most: NDArray[np.bool_] = values >= values.max() * (1 - 1e-12)
+    return most
+
+
+_SETTLED_BY = ("it touched first", "by its place", "by what else it does", "by its label alone")
+
+
+def settled(history: SegmentHistory, equal: Sequence[int], *, partner: int | None = None) -> tuple[list[int], str]:
+    """Segments that are equal in what decides, in an order that does not depend on their labels if that can be.
+
+    The one that touches first comes first; of those that touch at once the one whose first place is smaller; then what
+    they do decides, and only where that is the same too, the label.
+
+    Parameters
+    ----------
+    history : SegmentHistory
+    equal : sequence of int
+        Their indices.
+    partner : int, optional
+        Index of the segment whose touch counts; any if left out.
+
+    Returns
+    -------
+    order : list of int
+        The indices, the one to be taken first.
+    reason : str
+        What was equal and by what it was settled; empty if there is only one.
+
+    Examples
+    --------
+    >>> seen = segment_history(EventChain([[0, 0, 2], [0, 2, 2], [0, 0, 0]], [(1, 2), (1, 3), (2, 3)]))
+    >>> settled(seen, [1, 2], partner=0)
+    ([2, 1], 'segments 3 and 2 are equal in what decides; 3 is taken, as it touched first')
+    """
+    if len(equal) < 2:
+        return list(equal), ""
+    keys = {i: _settling(history, i, partner) for i in equal}
+    order = sorted(equal, key=lambda i: (*keys[i], history.members[i]))
+    level = next((k for k in range(3) if keys[order[0]][k] != keys[order[1]][k]), 3)
+    labels = [str(history.members[i][0]) for i in order]
+    why = _SETTLED_BY[level]
+    return order, (
+        f"segments {', '.join(labels[:-1])} and {labels[-1]} are equal in what decides; {labels[0]} is taken, "
+        f"{'as ' if level == 0 else ''}{why}"
+    )
+
+
+def _settling(history: SegmentHistory, i: int, partner: int | None) -> tuple[int, tuple[float, ...], tuple[bytes, ...]]:
+    rows = history.relations[i]
+    touching = (rows if partner is None else rows[[partner]]) == Relation.TOUCHING
+    at = np.flatnonzero(touching.any(axis=0))
+    present = history.present[i]
+    place: tuple[float, ...] = ()
+    if history.places is not None and present.any():
+        place = tuple(history.places[i, int(present.argmax())].tolist())
+    does = (present.tobytes(), *sorted(row.tobytes() for row in rows))
+    return int(at[0]) if at.size else present.size, place, does
 
 
 def time_shares(key_frames: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from sec_lab.role_tables.table import RoleTable
+from sec_lab.role_tables.table import RoleTable, as_role_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +41,7 @@ def role_similarity(a: RoleTable, b: RoleTable, *, compressed: Compressed = "cha
     Raises
     ------
     ValueError
-        If the way of compression is unknown.
+        If one of them is no role table, or the way of compression is unknown.
 
     Examples
     --------
@@ -104,7 +104,32 @@ def role_similarity_table(
 
 
 def compressed_rows(table: RoleTable, *, compressed: Compressed = "changes") -> tuple[Symbols, ...]:
-    """The ten rows of a role table without time, see :func:`role_similarity`."""
+    """The ten rows of a role table without time, see :func:`role_similarity`.
+
+    Parameters
+    ----------
+    table : RoleTable
+    compressed : {"changes", "relations"}, optional
+
+    Returns
+    -------
+    tuple of 10 tuples of int
+        Relations; or changes as numbers of two digits, 3 being the beginning and 4 the end.
+
+    Raises
+    ------
+    ValueError
+        If it is no role table, or the way of compression is unknown.
+
+    Examples
+    --------
+    >>> from sec_lab.event_chain import EventChain
+    >>> from sec_lab.role_tables.table import role_table
+    >>> seen = role_table(EventChain([[9, 0, 2, 2, 9], [9, 0, 0, 0, 9], [2, 2, 2, 0, 0]], [(7, 1), (7, 2), (2, 1)]))
+    >>> compressed_rows(seen)[:2], compressed_rows(seen, compressed="relations")[:2]
+    (((39, 90, 2, 29, 94), (32, 20, 4)), ((9, 0, 2, 9), (2, 0)))
+    """
+    as_role_table(table)
     if compressed not in get_args(Compressed):
         raise ValueError(f"compressed: expected one of {get_args(Compressed)}, got {compressed!r}")
     found = []

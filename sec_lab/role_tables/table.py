@@ -13,7 +13,7 @@ from sec_lab.event_chain import EventChain, Names
 from sec_lab.observation import Observation
 from sec_lab.role_tables.cleaning import Cleaning, clean
 from sec_lab.role_tables.hand import find_hand
-from sec_lab.role_tables.history import SegmentHistory, segment_history, time_shares
+from sec_lab.role_tables.history import SegmentHistory, largest, segment_history, settled, time_shares
 from sec_lab.role_tables.motion import up_direction, vertical_share
 
 if TYPE_CHECKING:
@@ -47,7 +47,9 @@ class RoleTable:
         Labels of the segments that play each role of :data:`ROLES`; empty for a role that is missing.
     missing : mapping of str to str
         What is missing, and why: role → reason. A missing role is absent throughout. ``"positions"`` is among them if
-        none are known: then the hand is told by presence and touch alone, and no motion is known.
+        none are known: then the hand is told by presence and touch alone, and no motion is known. ``"clear hand"``,
+        ``"clear object 1"`` and so on are among them if several segments are equal in what decides on a role that is
+        played all the same (:func:`~sec_lab.role_tables.history.settled`).
     key_frames : (n_key_frames,) int64
         Frame numbers.
     names : mapping of int to str or None
@@ -60,7 +62,8 @@ class RoleTable:
     Raises
     ------
     ValueError
-        If shapes disagree or a code is none of 0, 2 and 9.
+        If shapes disagree, a code is none of 0, 2 and 9, an absent role touches, there is no key frame, frames do not
+        ascend, or the share is not from 0 to 1.
     """
 
     relations: NDArray[np.uint8]
@@ -82,6 +85,13 @@ class RoleTable:
             raise ValueError(f"present: expected shape {(len(ROLES), len(frames))}, got {present.shape}")
         if (codes == Relation.OVERLAPPING).any():
             raise ValueError("relations: expected 0, 2 and 9 in a role table, got 1")
+        if not len(frames) or (frames[1:] <= frames[:-1]).any():
+            raise ValueError(f"key_frames: expected at least one, ascending, got {frames.tolist()}")
+        first, second = np.transpose(ROWS)
+        if ((codes == Relation.TOUCHING) & ~(present[first] & present[second])).any():
+            raise ValueError("relations: expected touches of roles that are there, got one of an absent role")
+        if not (np.isnan(self.vertical_share) or 0 <= self.vertical_share <= 1 + 1e-9):
+            raise ValueError(f"vertical_share: expected 0 to 1, or NaN, got {self.vertical_share}")
         if tuple(self.segments) != ROLES:
             raise ValueError(f"segments: expected those of the roles {ROLES}, got {tuple(self.segments)}")
         for name, array in (("relations", codes), ("present", present), ("key_frames", frames)):
@@ -149,7 +159,8 @@ def role_table(
     No model of any thing is needed. The hand is found by :func:`~sec_lab.role_tables.find_hand`. Object 1 is what the
     hand touches longest. Object 2 is what object 1 touches, with most beginnings and ends of touching; of equal ones
     the one that appears or vanishes while it is touched, then the one that is touched longest. Object 3 is the next of
-    these, the partner is what object 2 touches otherwise, by the same rule.
+    these, the partner is what object 2 touches otherwise, by the same rule. Where several are equal in all of this, the
+    one that touched first is taken, and :attr:`RoleTable.missing` says so.
 
     Parameters
     ----------
@@ -188,14 +199,14 @@ def role_table(
     history = recording if isinstance(recording, SegmentHistory) else segment_history(recording)
     if hands is None:
         found = find_hand(history)
-        labels, told_by = ([] if found.segment is None else [found.segment]), found.reason
+        labels, told_by, doubt = ([] if found.segment is None else [found.segment]), found.reason, found.doubt
     else:
-        labels, told_by = _known_hands(hands, history, names), "given"
+        labels, told_by, doubt = _known_hands(hands, history, names), "given", ""
     if not labels:
         return _without_hand(history, names, told_by)
     cleaned = clean(history, hands=labels, cleaning=cleaning)
     at, missing = _roles(cleaned)
-    missing |= _without_positions(history)
+    missing = ({f"clear {ROLES[0]}": doubt} if doubt else {}) | missing | _without_positions(history)
     relations = np.full((len(ROWS), len(history.key_frames)), Relation.ABSENT, np.uint8)
     present = np.zeros((len(ROLES), len(history.key_frames)), np.bool_)
     for role, i in enumerate(at):
@@ -215,6 +226,19 @@ def role_table(
     return RoleTable(relations, present, segments, missing, history.key_frames, names, share, told_by)
 
 
+def as_role_table(table: RoleTable) -> RoleTable:
+    """A role table, checked.
+
+    Raises
+    ------
+    ValueError
+        If it is something else.
+    """
+    if not isinstance(table, RoleTable):
+        raise ValueError(f"table: expected a RoleTable (see role_table), got {type(table).__name__}")
+    return table
+
+
 def recording_names(recording: Observation | EventChain) -> Names:
     """Names of the segments of an observation or a chain.
 
@@ -229,7 +253,7 @@ def recording_names(recording: Observation | EventChain) -> Names:
 
 
 def _known_hands(hands: Sequence[int | str], history: SegmentHistory, names: Names) -> list[int]:
-    if isinstance(hands, str) or not len(hands):
+    if isinstance(hands, str) or not isinstance(hands, Sequence | np.ndarray) or not len(hands):
         raise ValueError(f"hands: expected a sequence of labels or names, got {hands!r}")
     recorded = [label for labels in history.members for label in labels]
     found = []
@@ -263,31 +287,42 @@ def _roles(history: SegmentHistory) -> tuple[list[int | None], dict[str, str]]:
         alone = len(history.members[0]) == 1
         why = "the hand touches nothing" if alone else "all that touches the hand comes and goes with it"
         return at, {ROLES[1]: why, **dict.fromkeys(ROLES[2:], "there is no object 1")}
-    first = int(held.argmax())
-    second = _worked_on(history, first, others=(0, first))
+    equal = np.flatnonzero(largest(held))
+    order, why = settled(history, equal.tolist(), partner=0)
+    first, doubts = order[0], {1: why}
+    second, doubts[2] = _worked_on(history, first, others=(0, first))
     at[1], at[2] = first, second
     if second is None:
-        return at, {
+        return at, _unclear(doubts) | {
             ROLES[2]: "object 1 touches nothing but the hand",
             ROLES[3]: "object 1 touches nothing else",
             ROLES[4]: "there is no object 2",
         }
-    at[3] = _worked_on(history, first, others=(0, first, second))
-    at[4] = _worked_on(history, second, others=(0, first, second))
+    at[3], doubts[3] = _worked_on(history, first, others=(0, first, second))
+    at[4], doubts[4] = _worked_on(history, second, others=(0, first, second))
     whys = {3: "object 1 touches nothing else", 4: "object 2 touches nothing else"}
-    return at, {ROLES[role]: why for role, why in whys.items() if at[role] is None}
+    return at, _unclear(doubts) | {ROLES[role]: why for role, why in whys.items() if at[role] is None}
 
 
-def _worked_on(history: SegmentHistory, segment: int, *, others: tuple[int, ...]) -> int | None:
-    """What a segment touches, with most changes, appearing or vanishing in touch, longest; None if nothing."""
+def _unclear(doubts: Mapping[int, str]) -> dict[str, str]:
+    return {f"clear {ROLES[role]}": why for role, why in doubts.items() if why}
+
+
+def _worked_on(history: SegmentHistory, segment: int, *, others: tuple[int, ...]) -> tuple[int | None, str]:
+    """What a segment touches, with most changes, appearing or vanishing in touch, longest; None if nothing.
+
+    And a word on equal ones, if there are any.
+    """
     touching = history.relations[segment] > 0
     touched = touching.any(axis=1)
     touched[list(others)] = False
     if not touched.any():
-        return None
+        return None, ""
     change = touching[:, 1:] != touching[:, :-1]
     both = history.present & history.present[segment]
     in_touch = change & ~(both[:, 1:] & both[:, :-1])
-    times = touching @ history.shares
-    order = np.lexsort((times, in_touch.sum(axis=1), change.sum(axis=1), touched))
-    return int(order[-1])
+    best = touched
+    for values in (change.sum(axis=1), in_touch.sum(axis=1), touching @ history.shares):
+        best = best & largest(np.where(best, values, 0))
+    order, why = settled(history, np.flatnonzero(best).tolist(), partner=segment)
+    return order[0], why

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sec_lab.role_tables.table import POSITIONS, ROLES, ROWS, RoleTable
+from sec_lab.role_tables.table import POSITIONS, ROLES, ROWS, RoleTable, as_role_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +24,11 @@ def in_words(table: RoleTable) -> str:
     -------
     str
         Lines.
+
+    Raises
+    ------
+    ValueError
+        If it is no role table.
 
     Examples
     --------
@@ -44,6 +49,7 @@ def in_words(table: RoleTable) -> str:
     There is no partner: object 2 touches nothing else.
     There are no positions: not all segments have a recorded one.
     """
+    as_role_table(table)
     lines = []
     named: set[str] = set()
 
@@ -92,7 +98,7 @@ def played_by(tables: Mapping[Hashable, RoleTable]) -> "pd.DataFrame":
     Raises
     ------
     ValueError
-        If there is no table.
+        If there is no table, or one of them is something else.
 
     Examples
     --------
@@ -104,8 +110,12 @@ def played_by(tables: Mapping[Hashable, RoleTable]) -> "pd.DataFrame":
     """
     import pandas as pd
 
+    if not isinstance(tables, Mapping):
+        raise ValueError(f"tables: expected a mapping of names to role tables, got {type(tables).__name__}")
     if not tables:
         raise ValueError("tables: expected at least one role table, got none")
+    for table in tables.values():
+        as_role_table(table)
     rows = [[table.name_of(role) for role in ROLES] for table in tables.values()]
     return pd.DataFrame(rows, index=pd.Index(list(tables)), columns=list(ROLES))
 

@@ -187,10 +187,14 @@ def _rank_among_equal(values: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _draw_lines(ax: Axes, lines: Mapping[str, float], height_in: float) -> None:
-    """Vertical lines with their names above the axes, each on a line of its own."""
+    """Vertical lines with their names above the axes, each on a line of its own.
+
+    Names stand towards the middle; those of outer lines stand higher, so that no line runs through a name.
+    """
+    levels = sorted(lines, key=lambda name: (lines[name] > 60, lines[name] if lines[name] <= 60 else -lines[name]))
     for number, (name, value) in enumerate(lines.items()):
         colour = CURVE_COLOURS[1:][number % (len(CURVE_COLOURS) - 1)]
-        top = 1 + (0.1 + 0.22 * (len(lines) - 1 - number)) / height_in
+        top = 1 + (0.1 + 0.22 * (len(lines) - 1 - levels.index(name))) / height_in
         ax.plot(
             [value, value], [0, top], transform=ax.get_xaxis_transform(), color=colour, linewidth=1.3, linestyle="--",
             clip_on=False, zorder=1, gid="line",

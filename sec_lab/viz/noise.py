@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sec_lab.noise import NoisySamples
 
 TP_COLOUR, FP_COLOUR = CURVE_COLOURS[:2]
-ADDED_COLOUR = "#d62f2f"
+ADDED_COLOUR = "#b00020"
 CLASS_COLOURS = ("#d62f2f", "#2f8f4b", "#2459ad", "#22262c")
 """Red, green, blue and black for the classes, as in Fig. 3.10."""
 
@@ -108,7 +108,7 @@ def draw_noisy_sample(
     frames = [((0, y), len(columns), 1) for y in np.flatnonzero(rows).tolist()]
     frames += [((x, 0), 1, len(rows)) for x in np.flatnonzero(columns).tolist()]
     for corner, width, height in frames:
-        ax.add_patch(Rectangle(corner, width, height, fill=False, edgecolor=ADDED_COLOUR, linewidth=1.6, clip_on=False,
+        ax.add_patch(Rectangle(corner, width, height, fill=False, edgecolor=ADDED_COLOUR, linewidth=2.2, clip_on=False,
                                zorder=5, gid="added"))  # fmt: skip
     return ax
 

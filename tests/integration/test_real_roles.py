@@ -15,6 +15,7 @@ from sec_lab.observation import Observation
 from sec_lab.recognition import recognition_rate
 from sec_lab.role_evaluation import nested_classifier, nested_neighbours
 from sec_lab.role_tables import Cleaning, RoleTable
+from sec_lab.scene_graph import SceneGraph
 from sec_lab.tracks import read_box_take, read_distance_table
 
 DATA = Path(os.environ.get("SEC_LAB_DATA") or "/nonexistent")
@@ -45,6 +46,30 @@ def test_hand_is_found_and_told_why(recordings: dict[str, Observation]) -> None:
     chains = [sl.role_table(seen.chain) for seen in recordings.values()]
     names = [table.names.get(table.segments["hand"][0]) for table in chains if "hand" not in table.missing]
     assert sum(name in ("Hand", "Arm") for name in names) >= 0.97 * len(recordings)
+
+
+def renamed(seen: Observation, new: dict[int, int]) -> Observation:
+    graphs = []
+    for graph in seen.recorded.graphs:
+        labels = np.array([new[label] for label in graph.segments.tolist()])
+        order = np.argsort(labels)
+        places = None if graph.positions is None else graph.positions[order]
+        graphs.append(SceneGraph(labels[order], graph.relations[np.ix_(order, order)], places))
+    return Observation(graphs, seen.recorded.key_frames, None, seen.position_unit)
+
+
+def test_roles_do_not_depend_on_labels(
+    recordings: dict[str, Observation], tables: dict[float, list[RoleTable]]
+) -> None:
+    rng = np.random.default_rng(6)
+    for seen, table in zip(recordings.values(), tables[10.0], strict=True):
+        labels = np.unique(np.concatenate([graph.segments for graph in seen.recorded.graphs])).tolist()
+        for _ in range(3):
+            new = dict(zip(labels, (rng.permutation(len(labels)) + 100).tolist(), strict=True))
+            other = sl.role_table(renamed(seen, new))
+            np.testing.assert_array_equal(other.rows, table.rows)
+            for role, played in table.segments.items():
+                assert set(other.segments[role]) == {new[label] for label in played}
 
 
 def test_nested_recognition_reaches_what_was_asked_for(

@@ -8,8 +8,8 @@ from sklearn.base import clone
 import sec_lab as sl
 from sec_lab.event_chain import EventChain
 from sec_lab.role_classifier import RoleTableClassifier, RoleTableNeighbour, feature_names, role_features
-from sec_lab.role_evaluation import learning_curve, nested_classifier, nested_neighbours
-from sec_lab.role_tables import RoleTable, role_table
+from sec_lab.role_evaluation import ingredient_table, learning_curve, nested_classifier, nested_neighbours
+from sec_lab.role_tables import Cleaning, RoleTable, role_table
 from tests.unit.test_ontology import RECORDINGS
 
 KINDS = ("take apart", "put together", "hide", "uncover", "stir")
@@ -185,3 +185,44 @@ def test_bad_options_are_told() -> None:
         nested_classifier({"x": (RoleTableClassifier(), [role_table(RECORDINGS["hide"])])}, ["a", "b"])
     with pytest.raises(ValueError, match="groups: expected one for each of 2"):
         nested_neighbours({"x": np.eye(2)}, ["a", "b"], groups=["p"])
+
+
+@pytest.mark.parametrize("kind", [RoleTableClassifier, RoleTableNeighbour])
+def test_answers_stay_of_their_type(
+    kind: type[RoleTableClassifier] | type[RoleTableNeighbour],
+    recordings: tuple[list[EventChain], NDArray[np.str_]],
+) -> None:
+    chains, types = recordings
+    numbers = np.unique(types, return_inverse=True)[1]
+    asked = [chains[0], NO_HAND]
+    mixed = kind(without_hand="?").fit(chains, numbers).predict(asked)
+    assert mixed.tolist() == [numbers[0], "?"]
+    same = kind(without_hand=-1).fit(chains, numbers).predict(asked)
+    assert same.dtype.kind == "i"
+    assert same.tolist() == [numbers[0], -1]
+    words = kind(without_hand="no hand in this one").fit(chains, types).predict(asked)
+    assert words.tolist() == [types[0], "no hand in this one"]
+
+
+def test_studies_tell_bad_input_and_show_bars(
+    recordings: tuple[list[EventChain], NDArray[np.str_]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    chains, types = recordings
+    tables = tables_of(chains)
+    option = RoleTableClassifier(), tables
+    with pytest.raises(ValueError, match="n_folds: expected a whole number of at least 2, got 0"):
+        nested_classifier({"": option}, types, n_folds=0)
+    with pytest.raises(ValueError, match="n_draws: expected a whole number of at least 1, got 0"):
+        learning_curve(option, types, n_demonstrations=[2], n_draws=0, rng=np.random.default_rng(0))
+    named = {str(i): chain for i, chain in enumerate(chains)}
+    with pytest.raises(ValueError, match="cleanings: expected a mapping with at least one entry"):
+        ingredient_table(named, types, cleanings={})
+    with pytest.raises(ValueError, match=r"classes: expected one for each of 30 recordings, got shape \(3,\)"):
+        ingredient_table(named, types[:3], cleanings={"": Cleaning()})
+    assert not capsys.readouterr().err
+    similar = {"": np.eye(len(types))}
+    nested_neighbours(similar, types, progress=True)
+    nested_classifier({"": option}, types, groups=np.arange(30) % 2, progress=True)
+    learning_curve(option, types, n_demonstrations=[2], n_draws=1, rng=np.random.default_rng(0), progress=True)
+    ingredient_table(named, types, cleanings={"": Cleaning()}, nested=False, progress=True)
+    assert capsys.readouterr().err.count("\n") == 4

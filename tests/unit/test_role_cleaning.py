@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sec_lab.event_chain import EventChain
@@ -118,6 +118,13 @@ def test_what_joins_the_hand_is_what_joins_it_in_the_twin(movie: naive.Movie, to
     group = naive.with_hand(movie, of, tolerance / 100 + 1e-12)
     history = merge_with_hand(segment_history(recording_of(movie)), hand=of, tolerance_percent=tolerance + 1e-10)
     others = [[label] for label in naive.segments(movie) if label not in group]
+    assert history.members[0][0] == of
+    assert set(history.members[0]) == set(group)
+    # Where they are is told by the hand, then by the one that is there longest.
+    lives = [naive.life(movie, label) for label in history.members[0]]
+    assume(len({round(life, 9) for life in lives}) == len(lives))
+    rounds = naive.with_hand_by_rounds(movie, of, tolerance / 100 + 1e-12)
+    group = [of, *(a for one in rounds for a in sorted(one, key=lambda a: -naive.life(movie, a)))]
     assert history.members[0] == tuple(group)
     assert movie_of(history) == naive.merged(movie, [group, *others])
 
@@ -241,3 +248,28 @@ def test_bad_input_is_told() -> None:
         segment_history(3)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="places: expected those of all segments"):
         path_lengths(history)
+
+
+def test_percentages_out_of_range_are_told() -> None:
+    history = segment_history(EventChain([[9, 2, 9], [9, 0, 9], [0, 0, 0]], [(7, 1), (7, 2), (1, 2)]))
+    for call, name in (
+        (lambda: merge_with_hand(history, hand=7, tolerance_percent=-1), "tolerance_percent"),
+        (lambda: drop_short_lived(history, hand=7, least_percent=101), "least_percent"),
+        (lambda: merge_moving_together(history, hand=7, most_percent=float("nan")), "most_percent"),
+    ):
+        with pytest.raises(ValueError, match=f"{name}: expected 0 to 100, got"):
+            call()
+
+
+def test_all_that_joins_the_hand_joins_at_once() -> None:
+    # 3 leaves with the hand 7, 4 comes with it. Would 3, which comes earlier, join alone and first, 4 would not come
+    # with the hand any more: the order of labels would decide.
+    life = {7: range(2, 5), 3: range(1, 5), 4: range(2, 4), 1: range(7), 2: range(7)}
+    for a, b in ((3, 4), (4, 3)):
+        now = {7: life[7], a: life[3], b: life[4], 1: life[1], 2: life[2]}
+        pairs = [(7, 1), (a, 1), (b, 1), (a, 7), (b, 7), (a, b), (1, 2)]
+        codes = [
+            [(2 if (x, y) == (7, 1) else 0) if k in now[x] and k in now[y] else 9 for k in range(7)] for x, y in pairs
+        ]
+        history = segment_history(EventChain(codes, pairs, range(0, 70, 10)))
+        assert merge_with_hand(history, hand=7).members == ((7, a, b), (1,), (2,))

@@ -108,9 +108,11 @@ def test_bad_input_is_refused() -> None:
 
 
 def test_a_bad_study_of_faults_is_refused() -> None:
-    good: dict[str, Any] = {"movies": ["opening_book_1_laboratory"], "rates": [1.0], "repeats": 1, "seed": 1}
+    two = ["opening_book_1_laboratory", "opening_book_2_laboratory"]
+    good: dict[str, Any] = {"movies": two, "rates": [1.0], "repeats": 1, "seed": 1}
     for changed, says in (
         ({"movies": ["foo_1_laboratory"]}, "movies: expected names as .*, got 'foo_1_laboratory'"),
+        ({"movies": two[:1]}, "movies: expected at least two of each action, got one of 'opening_book'"),
         ({"movies": []}, "movies: expected at least one, got none"),
         ({"rates": [200]}, r"rates: expected faults in a hundred frames, 0 to 100, got \[200\]"),
         ({"repeats": 0}, "repeats: expected a whole number of at least 1, got 0"),

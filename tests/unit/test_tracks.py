@@ -31,7 +31,7 @@ def test_what_does_not_last_is_taken_for_what_was_before(tmp_path: Path) -> None
     seen = read_distance_table(written(tmp_path, TABLE), least_frames=2)
     assert seen.chain.relations.tolist() == [[2, 2], [0, 0], [0, 2]]
     assert seen.key_frames.tolist() == [0, 4]
-    with pytest.raises(ValueError, match="least_frames: expected at least 1, got 0"):
+    with pytest.raises(ValueError, match="least_frames: expected a whole number of at least 1, got 0"):
         read_distance_table(written(tmp_path, TABLE), least_frames=0)
 
 
@@ -115,11 +115,26 @@ def test_a_box_that_is_lost_for_a_moment_is_held(tmp_path: Path) -> None:
         {"frames": {"0": {"objects": [box("cup", 1.0, -1.0)]}}, "gt": {}},
         {**take(), "gt": {"right_hand": [0, [0, None, None]]}},
         {**take(), "gt": {"right_hand": [0, [99, None, None], 5]}},
+        {**take(), "gt": {"right_hand": [0, [-1, None, None], 5]}},
+        {"frames": {"0": {"objects": [box("cup", 0.0), box("cup", 7.0)]}}, "gt": {}},
     ],
 )
 def test_damaged_takes_are_refused(tmp_path: Path, content: object) -> None:
     with pytest.raises(UnusableFileError, match="expected a take of boxes, but it is damaged"):
         read_box_take(packed(tmp_path, content))
+
+
+def test_options_out_of_range_are_not_the_fault_of_the_file(tmp_path: Path) -> None:
+    path = packed(tmp_path, take())
+    for options, message in (
+        ({"least_frames": 0}, "least_frames: expected a whole number of at least 1, got 0"),
+        ({"least_frames": 1.5}, "least_frames: expected a whole number of at least 1, got 1.5"),
+        ({"gap_m": -1}, "gap_m: expected a finite distance of at least 0, got -1"),
+        ({"gap_m": float("nan")}, "gap_m: expected a finite distance of at least 0, got nan"),
+    ):
+        with pytest.raises(ValueError, match=message) as error:
+            read_box_take(path, **options)  # type: ignore[arg-type]
+        assert not isinstance(error.value, UnusableFileError)
 
 
 def test_cut_off_and_plain_files_are_refused(tmp_path: Path) -> None:

@@ -132,6 +132,19 @@ def test_other_values_are_lines_with_their_names_inside_the_figure() -> None:
         assert 0 <= box.y0 <= box.y1 <= figure.bbox.y1
 
 
+def test_no_line_runs_through_the_name_of_another() -> None:
+    lines = {"guessing": 12.5, "published: with something": 85.0, "published: with something else": 97.0, "less": 20.0}
+    ax = draw_intervals(INTERVALS, x_label="recognised in %", lines=lines)
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    png_bytes(figure)
+    names = [text.get_window_extent() for text in ax.texts if "%" in text.get_text()]
+    assert len(names) == 4
+    for line in (line for line in ax.lines if line.get_gid() == "line"):
+        (x, _), (_, top) = line.get_transform().transform(line.get_xydata())
+        assert not any(name.x0 < x < name.x1 and name.y0 < top for name in names)
+
+
 @pytest.mark.parametrize(
     ("frame", "message"),
     [

@@ -169,8 +169,8 @@ def fault_study(
     Raises
     ------
     ValueError
-        If there is no movie, rate or repeat, a fault is unknown, a rate is out of range, or a movie is none of the
-        tabletop movies.
+        If there is no rate or repeat, a fault is unknown, a rate is out of range, a movie is none of the tabletop
+        movies, or there are fewer than two of an action.
     sec_lab.files.UnusableFileError
         If there is no such movie in the folder.
 
@@ -179,7 +179,9 @@ def fault_study(
     >>> movies = ["opening_book_1_laboratory", "opening_book_2_laboratory"]
     >>> broken, models = fault_study(
     ...     Path("datasets/tabletop_actions"), movies=movies, rates=[2.0], repeats=1, seed=1, faults=["vanish"]
-    ... )  # doctest: +SKIP
+    ... )
+    >>> broken["fault"].tolist(), models["fault"].tolist()
+    (['none', 'vanish', 'none', 'vanish'], ['vanish'])
     """
     import pandas as pd
     from joblib import Parallel, delayed
@@ -194,8 +196,16 @@ def fault_study(
     for fault in faults:
         if fault not in FAULTS:
             raise ValueError(f"faults: expected some of {FAULTS}, got {fault!r}")
+    actions = [action_of(name) for name in movies]
+    numbers = [[seed, _number_of(name)] for name in movies]
+    alone = [action for action in dict.fromkeys(actions) if actions.count(action) < 2]
+    if alone:
+        raise ValueError(f"movies: expected at least two of each action, got one of {alone[0]!r}")
     # Random numbers of its own for every movie, rate and repeat: leaving some out leaves the others as they are.
-    tasks = [(folder / name, tuple(faults), tuple(rates), repeats, [seed, _number_of(name)]) for name in movies]
+    tasks = [
+        (folder / name, tuple(faults), tuple(rates), repeats, number)
+        for name, number in zip(movies, numbers, strict=True)
+    ]
     shown = sys.stderr.isatty() if progress is None else progress
     run = Parallel(n_jobs=n_jobs, return_as="generator")(delayed(_broken_chains)(*task) for task in tasks)
     found = dict(zip(movies, tqdm(run, total=len(tasks), unit="movie", disable=not shown), strict=True))
