@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from sec_lab.execution.anchors import PrimeMover, prime_mover
-from sec_lab.execution.perception import COLOURS, MINIMUM_PX, Perceived, SeenThing, things_in
+from sec_lab.execution.perception import Perceived
+from sec_lab.execution.things import COLOURS, MINIMUM_PX, SeenThing, things_in
 from sec_lab.recording import Recording
 from sec_lab.segmentation.colour import colour_segments
 from sec_lab.worlds.katana.records import Camera, Floats

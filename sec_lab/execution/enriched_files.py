@@ -31,7 +31,8 @@ import numpy as np
 from defusedxml.ElementTree import fromstring
 
 from sec_lab.execution.enriched import Enriched, Filmed, enrich
-from sec_lab.execution.perception import TABLE, Perceived, SeenThing, decisive_rows
+from sec_lab.execution.perception import Perceived, decisive_rows
+from sec_lab.execution.things import TABLE, SeenThing
 from sec_lab.files import UnusableFileError, read_whole, write_whole
 from sec_lab.graphml import read_observation
 from sec_lab.graphml.dialect import to_text

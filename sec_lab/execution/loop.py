@@ -7,8 +7,9 @@ import numpy as np
 
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
+from sec_lab.execution.macro import way_home
 from sec_lab.execution.motion import Run, UnreachableError
-from sec_lab.execution.perception import CONTACT_M, TABLE, Perceived, Watcher, things_in
+from sec_lab.execution.perception import TABLE, Perceived, Watcher
 from sec_lab.execution.planning import Skill, Step, plan, shifted, told
 from sec_lab.execution.relative_poses import Hand
 from sec_lab.observation import Observation
@@ -118,12 +119,11 @@ def execute_skill(
         At the first look, before anything moves: nothing can be done, or not by this arm.
     """
     run = Run(scene, fault=fault, watched=True)
-    steps = _planned(run, scene, skill, again=False)
+    watcher = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND)
+    steps = _planned(run, watcher, scene, skill, again=False)
     verdicts: list[Verdict] = []
     attempt, gave_up = 0, ""
     while True:
-        watcher = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND)
-        watcher.add(run.view(), tip_m=run.tip_m)
         seen = _seen_from(run, watcher, run.n_frames)
         agrees, pressed, further = True, None, np.zeros(3)
         for planned in steps:
@@ -146,11 +146,14 @@ def execute_skill(
         if attempt >= most_attempts:
             gave_up = f"{attempt} attempts failed"
             break
+        # What has been seen whole stays known, though it may be half hidden now.
+        renewed = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND, known=watcher.known)
         try:
-            steps = _planned(run, scene, skill, again=True)
+            steps = _planned(run, renewed, scene, skill, again=True)
         except ValueError as error:
             gave_up = str(error)
             break
+        watcher = renewed
     return Outcome(
         agrees,
         tuple(verdicts),
@@ -206,19 +209,22 @@ def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None)
     perceived : Perceived
     skill : Skill
     pressed_m : float, optional
-        How wide the gap looked while the one pushed the other, so that there was none.
+        How wide the gap looked while the one pushed the other, so that there was none; what is left out is known from
+        the demonstrations.
     """
     gap = perceived.last_gap_m(skill.first, skill.second)
-    most = CONTACT_M[0] if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M) + _LOOSE_M
+    none = skill.contact_gap_m if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M)
+    most = none + _LOOSE_M
     if gap <= most:
         return ""
     pair = _told(frozenset((skill.first, skill.second)))
     return f"{pair}: expected a gap of at most {1000 * most:.1f} mm, got {1000 * gap:.1f} mm"
 
 
-def _planned(run: Run, scene: Scene, skill: Skill, *, again: bool) -> tuple[Step, ...]:
+def _planned(run: Run, watcher: Watcher, scene: Scene, skill: Skill, *, again: bool) -> tuple[Step, ...]:
     """A plan for what is seen now, all of it within the arm's reach from where it is."""
-    steps = plan(skill, things_in(run.view(), scene.camera), home_m=scene.home_m, again=again)
+    things = watcher.add(run.view(), tip_m=run.tip_m)
+    steps = plan(skill, things, home_m=scene.home_m, again=again)
     run.check(*(move for step in steps for move in step.moves))
     return steps
 
@@ -285,13 +291,14 @@ def _withdraw(run: Run, scene: Scene, seen: Callable[[], None], hand: Hand) -> N
     x, y, z = run.tip_m
     if hand.closes:
         run.move(Move((x, y, z), hand.after, "let go"))
-    home = Move(scene.home_m, name="home", speed_m_s=0.3)
     for height in _OVER_M:
-        up = Move((x, y, height), name="up", speed_m_s=0.1)
-        if z < height and _reaches(run, up, home):
-            run.move(up)
+        ways = Move((x, y, max(z, height)), name="up", speed_m_s=0.1), *way_home((x, y, max(z, height)), scene.home_m)
+        if _reaches(run, *ways):
             break
-    run.move(home)
+    else:
+        ways = (Move(scene.home_m, name="home", speed_m_s=0.3),)
+    for move in ways:
+        run.move(move)
     seen()
 
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sec_lab.execution.anchors import PrimeMover, connection_vector, intersections, segment_length
 from sec_lab.execution.grips import (
@@ -50,6 +51,7 @@ INSTRUCTIONS = (
 )
 """As the thesis has them; with the sixth goes: "(For pushing do this by cross-sectioning with object borders)."."""
 
+_NEAR_COLUMN_M, _OUT_M = 0.20, 0.26
 _ABOVE_M = 0.03
 """Between the fingers and the top of what they have let go of."""
 
@@ -340,8 +342,31 @@ def third_segment(
             Move(_at(away, stands), skill.hand.after, "release"),
             Move(_at(away, clear), name="leave", speed_m_s=_DOWN_M_S),
         )
-    home = (Move(_at(away, over), name="up", speed_m_s=0.1), Move(home_m, name="home", speed_m_s=_FREE_M_S))
+    home = (Move(_at(away, over), name="up", speed_m_s=0.1), *way_home((*away, over), home_m))
     return Segment(tuple(parting), leave), Segment(tuple(leaving), home)
+
+
+def way_home(from_m: ArrayLike, home_m: Point) -> tuple[Move, ...]:
+    """Moves from a place high up to a home (D8); near its own column the arm cannot rise, so it goes outwards first.
+
+    Parameters
+    ----------
+    from_m : (3,) array_like of float
+    home_m : tuple of float
+
+    Examples
+    --------
+    >>> [move.name for move in way_home((0.3, 0.0, 0.15), (-0.1, 0.3, 0.3))]
+    ['home']
+    >>> [move.name for move in way_home((0.12, 0.0, 0.15), (-0.1, 0.3, 0.3))]
+    ['out', 'home']
+    """
+    place = np.asarray(from_m, dtype=np.float64)
+    away = float(np.hypot(place[0], place[1]))
+    home = Move(home_m, name="home", speed_m_s=_FREE_M_S)
+    if away >= _NEAR_COLUMN_M:
+        return (home,)
+    return Move(_at(_OUT_M / away * place[:2], float(place[2])), name="out", speed_m_s=_FREE_M_S), home
 
 
 def macro(

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from sec_lab.execution.anchors import connection_vector, coordinate_origin, in_frame
 from sec_lab.execution.enriched import Enriched
-from sec_lab.execution.perception import SeenThing
 from sec_lab.execution.planning import Skill
+from sec_lab.execution.things import SeenThing
 from sec_lab.worlds.katana.records import Floats
 
 NAMES = ("S1", "E1", "S2", "E2", "E3")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Failure = Literal["slips", "missed", "wrong object", "removed"]
-SEED, N_SCENES, N_PLANTED = 2014, 100, 12
+SEED, N_SCENES, N_PLANTED = 2015, 100, 6
 
 _MISSES_BY_M = 0.09
 _BINS_DEG = (0.0, 15.0, 30.0, 45.0)
@@ -102,6 +102,7 @@ class PlantedTrial:
     recognised_at: str
     why: str
     n_attempts: int
+    gave_up: str
     accepted: bool
     touching: bool
 
@@ -214,6 +215,7 @@ def planted_trial(skill: Skill, kind: Failure, *, seed: int, number: int) -> Pla
         wrong[0].rule if wrong else "",
         wrong[0].why if wrong else "",
         done.n_attempts,
+        done.gave_up,
         done.success,
         _touching(done, red, green),
     )

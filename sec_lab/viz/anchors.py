@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sec_lab.viz.scene import draw_segments
 from sec_lab.viz.style import INK, PAGE_WIDTH_IN, PAPER, SMALL_PT, SOFT, TEXT_PT, axes_at, bare, new_figure, tidy
-from sec_lab.worlds.katana import Camera, Move, project
+from sec_lab.worlds.katana import Camera, Move, View, project
 
 if TYPE_CHECKING:
     from sec_lab.execution.anchors import Intersections, PrimeMover
@@ -185,15 +185,13 @@ def draw_demonstrated(
 
 
 def draw_planned(
-    image: ArrayLike,
-    camera: Camera,
+    sight: View,
     found: "Intersections",
     moves: Sequence[Move],
     *,
     origin_m: ArrayLike,
     connection_m: ArrayLike,
     start_m: ArrayLike,
-    height_m: float,
     ax: Axes | None = None,
     title: str | None = None,
 ) -> Axes:
@@ -201,16 +199,14 @@ def draw_planned(
 
     Parameters
     ----------
-    image : (height, width, 3) array_like of uint8
-    camera : Camera
+    sight : View
+        What the camera sees before anything moves.
     found : Intersections
         D6.
     moves : sequence of Move
         Of the plan.
     origin_m, connection_m, start_m : (3,) array_like of float
-        D4, D5, and where the tip is now (S₁).
-    height_m : float
-        At which the points in the plane are drawn.
+        D4, D5, and where the tip is now (S₁). Points in the plane are drawn at the height of the origin.
     ax : matplotlib.axes.Axes, optional
     title : str, optional
 
@@ -218,14 +214,15 @@ def draw_planned(
     -------
     matplotlib.axes.Axes
     """
-    ax = _over_picture(image, camera, ax=ax, title=title)
+    camera = sight.camera
+    ax = _over_picture(sight.image, camera, ax=ax, title=title)
     path = np.array([start_m, *(move.to_m for move in moves)], dtype=np.float64)
     pixels = _seen(camera, path)
     ax.plot(*pixels.T, color=_WAYS["V1"], linewidth=1.1, linestyle=(0, (4, 2)), zorder=3, path_effects=_HALO)
     ax.plot(*pixels.T, color=_WAYS["V1"], marker="o", markersize=2.5, linestyle="", zorder=3)
     origin = np.asarray(origin_m, dtype=np.float64)
     _connect(ax, camera, origin, origin + np.asarray(connection_m, dtype=np.float64))
-    points = {name: np.array([*getattr(found, f"{name}_m"), height_m]) for name in ("E1", "S2", "E2")}
+    points = {name: np.array([*getattr(found, f"{name}_m"), origin[2]]) for name in ("E1", "S2", "E2")}
     points |= {"S1": np.asarray(start_m, dtype=np.float64), "E3": np.asarray(moves[-1].to_m)}
     _mark_points(ax, camera, points, delta_m=float(np.linalg.norm(found.E2_m - found.S2_m)))
     return ax

@@ -167,7 +167,7 @@ def _meshcat() -> "Meshcat":
 
     with _quiet():
         # An empty port lets the system choose one.
-        meshcat = Meshcat(MeshcatParams(host=_LOOPBACK))
+        meshcat = Meshcat(MeshcatParams(host=_LOOPBACK, show_stats_plot=False))
     for path in ("/Background", "/Grid", "/Axes"):
         meshcat.SetProperty(path, "visible", value=False)
     for light, strength in _LIGHTS:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sec_lab.execution.perception import COLOURS, MINIMUM_PX
+from sec_lab.execution.things import COLOURS, MINIMUM_PX
 from sec_lab.observation import Observation
 from sec_lab.recording import Frame, Recording
 from sec_lab.scene_graph import SceneGraph

@@ -1,12 +1,15 @@
 """Perception, anchor points, plans, and the closed loop."""
 
-from dataclasses import replace
+import hashlib
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from sec_lab.codes import to_letters
+from sec_lab.execution.__main__ import main
 from sec_lab.execution.anchors import (
     border_distance,
     connection_vector,
@@ -20,13 +23,23 @@ from sec_lab.execution.loop import execute_skill, loose
 from sec_lab.execution.macro import macro
 from sec_lab.execution.perception import SeenThing, Watcher, perceive, things_in
 from sec_lab.execution.planning import Rule, SceneError, Skill, check_scene, plan
-from sec_lab.execution.study import skill_of
+from sec_lab.execution.study import (
+    N_PLANTED,
+    N_SCENES,
+    SEED,
+    planted_rates,
+    pushed_away,
+    scene_rates,
+    skill_of,
+    trial,
+)
 from sec_lab.recording import Frame
 from sec_lab.worlds.katana import Fault, Move, Run, UnreachableError, camera_at, example_scene, view
 from sec_lab.worlds.katana.scenes import BLUE, reach_of, thing
-from sec_lab.worlds.katana.stored import read_demonstration
+from sec_lab.worlds.katana.stored import read_demonstration, read_demonstrations
 
-DEMONSTRATIONS = Path(__file__).parents[2] / "datasets" / "katana_pushing"
+DATASETS = Path(__file__).parents[2] / "datasets"
+DEMONSTRATIONS, SCENES = DATASETS / "katana_pushing", DATASETS / "katana_scenes"
 
 
 def _square(name: str, middle: tuple[float, float], side: float, turn: float = 0.0) -> SeenThing:
@@ -128,6 +141,23 @@ def test_what_is_hidden_is_not_absent(rows: tuple[int, ...], top: int, present: 
     assert ("robot arm" in {one.name for one in seen}) == present
 
 
+def test_what_was_seen_whole_is_known_where_it_is_half_hidden() -> None:
+    """After a failure the second object may stand behind the first."""
+    scene = example_scene("a")
+    red, green = scene.things
+    green = replace(green, p_W_m=(0.28, 0.0, 0.03), yaw_rad=0.2)
+    apart = replace(scene, things=(replace(red, p_W_m=(0.30, -0.14, 0.03)), green))
+    before = replace(scene, things=(replace(red, p_W_m=(0.35, 0.01, 0.03)), green))
+    first = Watcher(scene.camera, frames_per_second=20.0)
+    first.add(view(apart))
+    again = Watcher(scene.camera, frames_per_second=20.0, known=first.known)
+    seen = {one.name: one for one in again.add(view(before))}
+    assert seen["green box"].bottom_m > 0.02
+    np.testing.assert_allclose(seen["green box"].centre_m[:2], green.p_W_m[:2], atol=5e-4)
+    np.testing.assert_allclose(np.ptp(seen["green box"].solid.corners_m, axis=0), 0.06, atol=8e-4)
+    assert set(first.known) == {"red box", "green box"}
+
+
 def test_watcher_needs_range_and_frames() -> None:
     watcher = Watcher(camera_at(), frames_per_second=20.0)
     with pytest.raises(ValueError, match="at least one frame"):
@@ -136,8 +166,8 @@ def test_watcher_needs_range_and_frames() -> None:
 
 @pytest.fixture(scope="module")
 def skill() -> Skill:
-    """Of four of the ten demonstrations, so that it does not take long."""
-    return skill_of(read_demonstration(DEMONSTRATIONS / f"demonstration_0{number}.npz") for number in (3, 4, 6, 8))
+    """Of all ten demonstrations, as for the stored tables."""
+    return skill_of(read_demonstrations(DEMONSTRATIONS))
 
 
 def test_the_model_is_that_of_the_thesis(skill: Skill) -> None:
@@ -257,7 +287,7 @@ def test_a_loose_contact_is_judged_by_the_gap_while_it_was_none(skill: Skill) ->
     def judge(gap_m: float, pressed_m: float | None) -> str:
         return loose(Seen(gap_m), skill, pressed_m=pressed_m)  # type: ignore[arg-type]
 
-    assert judge(0.0004, 0.0) == judge(0.0014, 0.001) == judge(0.0004, -0.001) == judge(0.0006, None) == ""
+    assert judge(0.0004, 0.0) == judge(0.0014, 0.001) == judge(0.0004, -0.001) == judge(0.0005, None) == ""
     assert judge(0.0007, 0.0) == "{green box, red box}: expected a gap of at most 0.5 mm, got 0.7 mm"
     assert judge(0.0016, 0.001) != ""
     # What looked apart by centimetres while it was pushed was no contact.
@@ -282,31 +312,13 @@ def test_a_move_out_of_reach_on_the_way_is_a_failure_and_no_error(
 
 @pytest.mark.slow
 def test_after_a_failure_the_arm_tries_again_from_what_it_sees(skill: Skill) -> None:
-    """The same scene gives the same to the bit."""
-    fault = Fault("missed", "over", offset_m=(0.0, 0.09))
-    done, again = (execute_skill(example_scene("c"), skill, fault=fault) for _ in range(2))
+    done = execute_skill(example_scene("c"), skill, fault=Fault("missed", "over", offset_m=(0.0, 0.09)))
     assert done.success
     assert done.n_attempts == 2
-    assert [verdict.attempt for verdict in done.verdicts if not verdict.agrees] == [0]
+    assert [(verdict.attempt, verdict.rule) for verdict in done.verdicts if not verdict.agrees] == [
+        (0, "{red box, robot arm} N→T")
+    ]
     assert done.truth.touching("red box", "green box")[-1]
-    assert done.verdicts == again.verdicts
-    for name, poses in done.truth.poses.items():
-        np.testing.assert_array_equal(poses, again.truth.poses[name])
-    for one, other in zip(done.recording, again.recording, strict=True):
-        np.testing.assert_array_equal(one.image, other.image)
-
-
-@pytest.mark.slow
-def test_the_arm_repeats_what_it_has_learned_and_judges_itself(skill: Skill) -> None:
-    scene = example_scene("c")
-    done = execute_skill(scene, skill)
-    assert done.success
-    assert done.truth.touching("red box", "green box")[-1]
-    # A thing that is taken away is missed, and the arm says so at the move in which it happens.
-    failed = execute_skill(scene, skill, fault=Fault("removed", "bring", "red box"), most_attempts=1)
-    assert not failed.success
-    wrong = next(verdict for verdict in failed.verdicts if not verdict.agrees)
-    assert wrong.rule == "{green box, red box} N→T"
 
 
 @pytest.mark.slow
@@ -314,7 +326,7 @@ def test_the_arm_repeats_what_it_has_learned_and_judges_itself(skill: Skill) -> 
     ("fault", "rule"),
     [
         (Fault("slips", "bring", "red box", share=0.2), "{green box, red box} N→T"),
-        (Fault("missed", "over", offset_m=(0.0, 0.09)), "{red box, robot arm} N→T"),
+        (Fault("removed", "bring", "red box"), "{green box, red box} N→T"),
         (Fault("wrong object", "over", "green box", "red box"), "{red box, robot arm} N→T"),
     ],
 )
@@ -324,3 +336,80 @@ def test_planted_failures_are_recognised_at_their_move(skill: Skill, fault: Faul
     assert not failed.success
     assert not failed.truth.touching("red box", "green box")[-1]
     assert next(verdict.rule for verdict in failed.verdicts if not verdict.agrees) == rule
+
+
+@pytest.mark.slow
+def test_a_sample_of_the_table_of_random_scenes_comes_out_again(skill: Skill) -> None:
+    """Same seed, same result; the arm repeats what it has learned and judges itself."""
+    stored = pd.read_csv(SCENES / "scenes.csv", keep_default_na=False)
+    again = asdict(trial(skill, seed=SEED, number=1))
+    assert again == stored.iloc[1].to_dict()
+    assert again["accepted"]
+    assert again["touching"]
+
+
+def test_counts_of_the_studies() -> None:
+    scenes = pd.DataFrame(
+        {
+            "shape": ["box", "box", "sphere", "cone"],
+            "refused": ["", "", "", "scene: too far"],
+            "accepted": [True, True, False, False],
+            "touching": [True, False, True, False],
+            "n_attempts": [1, 2, 4, 0],
+            "second_diagonal_deg": [10.0, 20.0, 44.0, 0.0],
+            "pushed_away_mm": [2.0, 1.0, 3.0, 0.0],
+        }
+    )
+    counts = scene_rates(scenes)
+    assert {what: (int(row["n"]), int(row["of"])) for what, row in counts.iterrows()} == {
+        "touching in the end": (2, 4),
+        "touching in the end: box": (1, 2),
+        "touching in the end: cone": (0, 1),
+        "touching in the end: sphere": (1, 1),
+        "refused": (1, 4),
+        "touching, refused or recognised as a failure": (3, 4),
+        "verdict right": (1, 3),
+        "accepted though apart": (1, 3),
+        "rejected though touching": (1, 3),
+        "in the first attempt": (1, 4),
+    }
+    # Wilson's interval of 2 in 4, in closed form: z = 1.96.
+    assert counts.loc["touching in the end", "low_percent"] == pytest.approx(15.0, abs=0.05)
+    assert pushed_away(scenes)[["n", "largest_mm"]].iloc[0].tolist() == [1, 2.0]
+    planted = pd.DataFrame(
+        {
+            "kind": ["slips", "removed"],
+            "rule": ["a", "b"],
+            "recognised_at": ["a", "c"],
+            "touching": [True, False],
+            "accepted": [True, False],
+        }
+    )
+    counts = planted_rates(planted)
+    assert counts["n"].to_dict() == {
+        "recognised at its move: slips": 1,
+        "recognised at its move: removed": 0,
+        "recognised at its move": 1,
+        "touching after further attempts": 1,
+        "verdict right in the end": 2,
+    }
+
+
+def test_the_tables_are_what_their_readme_says() -> None:
+    """Hashes, one row for each scene, and the numbers that the notebook shows."""
+    for line in (SCENES / "sha256sums.txt").read_text().splitlines():
+        digest, name = line.split()
+        assert hashlib.sha256((SCENES / name).read_bytes()).hexdigest() == digest
+    scenes = pd.read_csv(SCENES / "scenes.csv", keep_default_na=False)
+    assert scenes["number"].tolist() == list(range(N_SCENES))
+    planted = pd.read_csv(SCENES / "planted.csv", keep_default_na=False)
+    assert len(planted) == 4 * N_PLANTED
+
+
+@pytest.mark.parametrize("arguments", [["--seed", "-1"], ["--number", "0"]])
+def test_the_command_line_of_the_studies_refuses_bad_numbers(arguments: list[str], tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main([str(DEMONSTRATIONS), str(tmp_path), *arguments])
+    with pytest.raises(SystemExit, match="2"):
+        main([str(tmp_path), str(tmp_path / "new")])
+    assert not (tmp_path / "new").exists()

@@ -17,7 +17,7 @@ from sec_lab.viz.anchors import (
     picture_axes,
 )
 from sec_lab.viz.watched import draw_seen, frames_at, projected
-from sec_lab.worlds.katana import Camera, Move, project
+from sec_lab.worlds.katana import Camera, Move, View, project
 from sec_lab.worlds.katana.demonstrations import SEED, demonstration_scene
 
 
@@ -115,9 +115,10 @@ def test_motion_is_drawn_over_demonstration_and_scene(
     red, green = (next(thing for thing in seen if thing.name == name) for name in ("red box", "green box"))
     moves = [Move((*red.centre_m[:2], 0.15)), Move((*green.centre_m[:2], 0.03)), Move((-0.1, -0.33, 0.3))]
     found = intersections(red, green)
+    sight = View(picture, np.ones(picture.shape[:2], dtype=np.float32), camera)
     draw_planned(
-        picture, camera, found, moves, origin_m=red.centre_m,
-        connection_m=connection_vector(red, green), start_m=(-0.1, 0.33, 0.3), height_m=0.03, ax=right, title="B",
+        sight, found, moves, origin_m=red.centre_m, connection_m=connection_vector(red, green),
+        start_m=(-0.1, 0.33, 0.3), ax=right, title="B",
     )  # fmt: skip
     said = [[text.get_text() for text in ax.texts if text.get_text()] for ax in (left, right)]
     assert f"Δ {1000 * recorded.delta_m:.0f} mm" in said[0]

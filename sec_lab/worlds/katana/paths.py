@@ -86,7 +86,8 @@ def path_of(q_rad: Floats, move: Move, *, step_s: float) -> Path:
 
 def _angles(q_rad: Floats, start: Floats, end: Floats, move: Move, share: Floats) -> Floats:
     points = start + (end - start) * share[:, None]
-    if min(start[2], end[2]) >= LOW_M:
+    # The start is known by the joints, so that a tip at this very height may lie a rounding error below it.
+    if min(start[2], end[2]) >= LOW_M - 1e-6:
         points = _round_the_column(start, end, share)
     q = joint_angles(points)
     now = float(q_rad[4])
