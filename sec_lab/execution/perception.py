@@ -261,8 +261,8 @@ class Watcher:
 
     def _lift(self, thing: SeenThing) -> float:
         """How much higher than at first its top is; nothing as long as it counts as touching the table."""
-        # What is known from an earlier attempt and half hidden in the first picture rests.
-        lift = thing.top_m - float(np.median(self._heights.get(thing.name, [thing.top_m])))
+        before = self._heights.get(thing.name) or [self._solids[thing.name].top_m]
+        lift = thing.top_m - float(np.median(before))
         return lift if lift > TABLE_CONTACT_M[0] else 0.0
 
     def _is_hidden(self, last: SeenThing) -> bool:
