@@ -1,7 +1,7 @@
 """The closed loop (§2.10.5, §2.10.6): look, plan, move, look again, compare with the model after every move, retry."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from sec_lab.execution.planning import Skill, Step, plan, shifted, told
 from sec_lab.execution.relative_poses import Hand
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
-from sec_lab.worlds.katana.records import Fault, Move, Scene, Truth
+from sec_lab.worlds.katana.records import Fault, Floats, Move, Scene, Truth
 from sec_lab.worlds.katana.run import FRAMES_PER_SECOND
 
 _NUDGE_M, _TOUCH_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.003, 0.0005, 0.02, 6
@@ -125,12 +125,14 @@ def execute_skill(
     attempt, gave_up = 0, ""
     while True:
         seen = _seen_from(run, watcher, run.n_frames)
-        agrees, pressed = True, None
-        for step in steps:
-            why = _do(run, step, watcher, seen, skill)
+        agrees, pressed, further = True, None, np.zeros(3)
+        for planned in steps:
+            # What is held is let go where it has been brought, not where it was to be brought.
+            step = _shifted(planned, further) if skill.hand.closes else planned
+            why, further = _do(run, step, watcher, seen, skill)
             perceived = watcher.perceived()
             if not why and frozenset(step.rule.pair) == {skill.first, skill.second}:
-                pressed = skill.contact_gap_m if skill.hand.closes else _pressed(perceived, skill)
+                pressed = 0.0 if skill.hand.closes else _pressed(perceived, skill)
             if not why and step.column_is_last:
                 why = loose(perceived, skill, pressed_m=pressed)
             verdicts.append(Verdict(attempt, told(step.rule), len(watcher), not why, why))
@@ -227,10 +229,14 @@ def _planned(run: Run, watcher: Watcher, scene: Scene, skill: Skill, *, again: b
     return steps
 
 
-def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill: Skill) -> str:
+def _shifted(step: Step, by_m: Floats) -> Step:
+    return replace(step, moves=tuple(shifted(move, by_m) for move in step.moves)) if by_m.any() else step
+
+
+def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill: Skill) -> tuple[str, Floats]:
     """Make the moves of a rule and look; go on a little as long as only the touching is missing that it asks for.
 
-    What is different from the model then is returned; empty if nothing.
+    What is different from the model then is returned (empty if nothing), and by how much it went on.
     """
     moves: Sequence[Move] = step.moves
     pair, further_m = frozenset(step.rule.pair), 0.0
@@ -241,7 +247,7 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
                 run.move(move)
             except UnreachableError as error:
                 seen()
-                return f"{move.name}: {error}"
+                return f"{move.name}: {error}", further_m * way
         perceived = _once_still(run, watcher, seen, skill)
         why = agreement(perceived.observation, skill, step.rule.column)
         missing = why.startswith(_told(pair) + ":")
@@ -257,7 +263,7 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
             max(0.0, min(gap, _MOST_FURTHER_M)) if skill.prime not in pair else 0.0
         )
         moves = (shifted(step.moves[-1], further_m * way),)
-    return why
+    return why, further_m * way
 
 
 def _pressed(perceived: Perceived, skill: Skill) -> float | None:
