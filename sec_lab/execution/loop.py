@@ -14,7 +14,7 @@ from sec_lab.execution.planning import Skill, Step, plan, shifted, told
 from sec_lab.execution.relative_poses import Hand
 from sec_lab.observation import Observation
 from sec_lab.recording import Recording
-from sec_lab.worlds.katana.records import Fault, Move, Scene, Truth
+from sec_lab.worlds.katana.records import Fault, Floats, Move, Scene, Truth
 from sec_lab.worlds.katana.run import FRAMES_PER_SECOND
 
 _NUDGE_M, _TOUCH_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.003, 0.0005, 0.02, 6
@@ -23,6 +23,8 @@ _PUSHED_M = 0.001
 _LOOSE_M, _MOST_OFF_M = 0.0003, 0.002
 """How much wider than while the one pushed the other their gap may look in the end; and how far off it may have looked
 then, when it was none."""
+_LET_GO_M = 0.0005
+"""The same of what was let go beside it, not pressed on."""
 _SPRUNG_M = 0.001
 """How much more than while the one was pressed on the other, which makes both give way a little."""
 _MOST_ATTEMPTS = 4
@@ -129,12 +131,14 @@ def execute_skill(
     attempt, gave_up = 0, ""
     while True:
         seen = _seen_from(run, watcher, run.n_frames)
-        agrees, pressed = True, None
-        for step in steps:
-            why = _do(run, step, watcher, seen, skill)
+        agrees, pressed, further = True, None, np.zeros(3)
+        for planned in steps:
+            # What is held is let go where it has been brought, not where it was to be brought.
+            step = _shifted(planned, further) if skill.hand.closes else planned
+            why, further = _do(run, step, watcher, seen, skill)
             perceived = watcher.perceived()
             if not why and frozenset(step.rule.pair) == {skill.first, skill.second}:
-                pressed = skill.contact_gap_m if skill.hand.closes else _pressed(perceived, skill)
+                pressed = 0.0 if skill.hand.closes else _pressed(perceived, skill)
             if not why and step.column_is_last:
                 why = loose(perceived, skill, pressed_m=pressed)
             verdicts.append(Verdict(attempt, told(step.rule), len(watcher), not why, why))
@@ -219,7 +223,7 @@ def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None)
     """
     gap = perceived.last_gap_m(skill.first, skill.second)
     none = skill.contact_gap_m if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M)
-    most = none + _LOOSE_M
+    most = none + (_LET_GO_M if skill.hand.closes else _LOOSE_M)
     if pressed_m is not None:
         # Where both look larger than they are, it is how far they have sprung apart that tells.
         most = min(most, pressed_m + _SPRUNG_M)
@@ -243,10 +247,14 @@ def _slower(move: Move, skill: Skill) -> Move:
     return replace(move, speed_m_s=_SLOWER * move.speed_m_s) if move.speed_m_s <= skill.speed_m_s else move
 
 
-def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill: Skill) -> str:
+def _shifted(step: Step, by_m: Floats) -> Step:
+    return replace(step, moves=tuple(shifted(move, by_m) for move in step.moves)) if by_m.any() else step
+
+
+def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill: Skill) -> tuple[str, Floats]:
     """Make the moves of a rule and look; go on a little as long as only the touching is missing that it asks for.
 
-    What is different from the model then is returned; empty if nothing.
+    What is different from the model then is returned (empty if nothing), and by how much it went on.
     """
     moves: Sequence[Move] = step.moves
     pair, further_m = frozenset(step.rule.pair), 0.0
@@ -257,7 +265,7 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
                 run.move(move)
             except UnreachableError as error:
                 seen()
-                return f"{move.name}: {error}"
+                return f"{move.name}: {error}", further_m * way
         perceived = _once_still(run, watcher, seen, skill)
         why = agreement(perceived.observation, skill, step.rule.column)
         missing = why.startswith(_told(pair) + ":")
@@ -273,7 +281,7 @@ def _do(run: Run, step: Step, watcher: Watcher, seen: Callable[[], None], skill:
             max(0.0, min(gap, _MOST_FURTHER_M)) if skill.prime not in pair else 0.0
         )
         moves = (shifted(step.moves[-1], further_m * way),)
-    return why
+    return why, further_m * way
 
 
 def _pressed(perceived: Perceived, skill: Skill) -> float | None:

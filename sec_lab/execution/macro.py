@@ -55,7 +55,7 @@ _NEAR_COLUMN_M, _OUT_M = 0.20, 0.26
 _ABOVE_M = 0.03
 """Between the fingers and the top of what they have let go of."""
 
-_FREE_M_S, _CARRY_M_S, _DOWN_M_S = 0.3, 0.15, 0.1
+_FREE_M_S, _CARRY_M_S, _DOWN_M_S, _STAND_M_S = 0.3, 0.15, 0.1, 0.02
 
 
 class MacroError(ValueError):
@@ -335,8 +335,11 @@ def third_segment(
         away = grip.put_m[:2]
         clear = float(grip.put_m[2] - grip.take_m[2]) + system.first.top_m + FINGERS_BEYOND_M + _ABOVE_M
         over = max(over, clear)
+        # What is let fall, be it by a millimetre, ends elsewhere: first it is made to stand.
+        stands = float(grip.put_m[2]) - (0.0 if skill.placed is None else skill.placed.let_go_m)
         leave = (
-            Move(_at(away, grip.put_m[2]), skill.hand.after, "release"),
+            Move(_at(away, stands), None, "stand", None, _STAND_M_S),
+            Move(_at(away, stands), skill.hand.after, "release"),
             Move(_at(away, clear), name="leave", speed_m_s=_DOWN_M_S),
         )
     home = (Move(_at(away, over), name="up", speed_m_s=0.1), *way_home((*away, over), home_m))

@@ -14,7 +14,7 @@ from sec_lab.worlds.katana.records import TABLE
 if TYPE_CHECKING:
     import pandas as pd
 
-PLACING_SCENES_SEED, N_PLACING_SCENES = 2015, 12
+PLACING_SCENES_SEED, N_PLACING_SCENES = 2016, 10
 
 
 @dataclass(frozen=True)

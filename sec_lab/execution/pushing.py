@@ -1,6 +1,7 @@
 """Pushing as one function: what was learned from the stored demonstrations, done in a new scene.
 
-``python -m sec_lab.execution.pushing FOLDER`` writes what is perceived in demonstrations beside them as GraphML (A.2).
+``python -m sec_lab.execution.pushing FOLDER`` writes what is perceived in demonstrations, of this or another
+manipulation, beside them as GraphML (A.2).
 """
 
 import argparse
@@ -121,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(
         prog="python -m sec_lab.execution.pushing",
-        description="Perceive demonstrations of pushing and write what was seen as GraphML beside them.",
+        description="Perceive demonstrations and write what was seen as GraphML beside them.",
         epilog="example: python -m sec_lab.execution.pushing datasets/katana_pushing --jobs 2",
     )
     parser.add_argument("folder", type=Path, help="where the demonstrations are")

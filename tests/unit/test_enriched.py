@@ -48,9 +48,13 @@ def folder(movies: dict[str, Demonstrated], tmp_path_factory: pytest.TempPathFac
 def same_numbers(one: Skill, other: Skill, *, atol: float) -> None:
     for what in ("starts", "touches", "ends"):
         np.testing.assert_allclose(getattr(one, what).points_m, getattr(other, what).points_m, atol=atol)
-    for what in ("standoff_m", "press_m", "side_rad", "contact_gap_m", "speed_m_s"):
-        # An angle is off by a length over that from the origin to the tip, 6 cm.
-        assert getattr(one, what) == pytest.approx(getattr(other, what), abs=atol / 0.06)
+    for what in ("press_m", "contact_gap_m"):
+        assert getattr(one, what) == pytest.approx(getattr(other, what), abs=3 * atol)
+    assert one.speed_m_s == pytest.approx(other.speed_m_s, rel=1e-3)
+    # Fingers that take hold in the middle stand in no direction from it, and at no distance from the border in it.
+    if not one.hand.closes:
+        assert one.standoff_m == pytest.approx(other.standoff_m, abs=3 * atol)
+        assert one.side_rad == pytest.approx(other.side_rad, abs=atol / 0.05)
 
 
 def test_a_skill_from_files_is_that_from_movies(movies: dict[str, Demonstrated], folder: Path) -> None:
@@ -69,6 +73,29 @@ def test_a_skill_from_files_is_that_from_movies(movies: dict[str, Demonstrated],
         np.testing.assert_allclose(
             [move.to_m for move in a.moves], [move.to_m for move in b.moves], atol=2 * ROUNDING_M
         )
+
+
+@pytest.mark.slow
+def test_pick_and_place_from_files_is_that_from_movies() -> None:
+    """Grip and placing too: they need the joints and the footprints in the end."""
+    folder = DEMONSTRATIONS.parent / "katana_pick_and_place" / "on"
+    movies = {}
+    for name in ("demonstration_01", "demonstration_04"):
+        given = read_demonstration(folder / f"{name}.npz")
+        seen = perceive(given.recording, given.scene.camera, tip_m=given.truth.tip_m)
+        truth = given.truth
+        movies[name] = Demonstrated(given.recording, given.scene.camera, seen, truth.tip_m, truth.joints_rad)
+    told = learn_skill({name: read_enriched(folder / f"{name}.graphml") for name in movies})
+    seen_skill = learn_skill(movies)
+    assert told.rules == seen_skill.rules
+    same_numbers(told, seen_skill, atol=ROUNDING_M)
+    assert told.hand.closes
+    assert (told.hand.before, told.hand.after) == (seen_skill.hand.before, seen_skill.hand.after)
+    assert told.hand.height_m == pytest.approx(seen_skill.hand.height_m, abs=ROUNDING_M)
+    assert told.hand.facing_rad == pytest.approx(seen_skill.hand.facing_rad, abs=1e-3)
+    assert told.placed is not None
+    assert seen_skill.placed is not None
+    np.testing.assert_allclose(told.placed.offset_m.points_m, seen_skill.placed.offset_m.points_m, atol=1e-4)
 
 
 def test_stored_files_are_what_is_perceived_today(folder: Path) -> None:

@@ -20,8 +20,9 @@ from sec_lab.execution.anchors import (
     start_points,
 )
 from sec_lab.execution.loop import execute_skill, loose
+from sec_lab.execution.macro import macro
 from sec_lab.execution.perception import SeenThing, Watcher, perceive, things_in
-from sec_lab.execution.planning import Rule, SceneError, Skill, plan
+from sec_lab.execution.planning import Rule, SceneError, Skill, check_scene, plan
 from sec_lab.execution.study import (
     N_PLANTED,
     N_SCENES,
@@ -180,6 +181,21 @@ def test_the_model_is_that_of_the_thesis(skill: Skill) -> None:
     assert abs(abs(skill.side_rad) - np.pi) < 0.05
     assert skill.starts.spread_m > 5 * skill.touches.spread_m
     assert skill.ends.spread_m > 5 * skill.touches.spread_m
+
+
+def test_pushing_is_an_instance_of_the_macro(skill: Skill) -> None:
+    """§2.11: nothing is lifted, the fingers do not close, and so no poses are needed."""
+    assert (skill.hand.closes, skill.hand.before, skill.hand.frame) == (False, None, "connection")
+    # The wrist stays as it is on the way down, which turns the fingers by some degrees.
+    assert abs(skill.hand.facing_rad) < 0.1
+    assert skill.placed is None
+    scene = example_scene("a")
+    things = things_in(view(scene), scene.camera)
+    done = macro(skill, *check_scene(skill, things), things, home_m=scene.home_m)
+    assert [len(one.segments) for one in done.instructions] == [0, 0, 1, 0, 0, 1, 0, 2]
+    assert done.instructions[0].result == "robot arm"
+    assert done.instructions[6].result.startswith("not needed")
+    assert done.steps == plan(skill, things, home_m=scene.home_m)
 
 
 def test_the_plan_goes_from_behind_the_first_object_towards_the_second(skill: Skill) -> None:

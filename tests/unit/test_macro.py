@@ -20,10 +20,10 @@ from sec_lab.execution.macro import (
 )
 from sec_lab.execution.perception import SeenThing, things_in
 from sec_lab.execution.planning import Rule, SceneError, Skill, check_scene, plan
-from sec_lab.execution.relative_poses import Handling, agreed_angle, agreed_hand, turn_of
+from sec_lab.execution.relative_poses import Hand, Handling, agreed_angle, agreed_hand, turn_of
 from sec_lab.execution.solids import Solid, gap_between, gap_to_points, raised
 from sec_lab.execution.study import skill_of
-from sec_lab.worlds.katana import Fault, Scene, example_scene, view
+from sec_lab.worlds.katana import Fault, view
 from sec_lab.worlds.katana.placing import placing_pose, placing_scene
 from sec_lab.worlds.katana.stored import read_demonstration
 
@@ -57,8 +57,9 @@ def beside() -> Skill:
 
 
 @pytest.fixture(scope="module")
-def push() -> Skill:
-    return skill_of(read_demonstration(FOLDER / "katana_pushing" / f"demonstration_0{n}.npz") for n in (6, 7))
+def push(on: Skill) -> Skill:
+    """As if the fingers had not closed; what is learned of pushing itself is tested beside its execution."""
+    return replace(on, rules=PUSHING, hand=Hand(), placed=None)
 
 
 def _learned(placing: str, numbers: tuple[int, ...]) -> Skill:
@@ -82,7 +83,7 @@ def test_what_is_put_on_leaves_the_table_for_good_and_what_is_put_beside_comes_b
         assert (skill.prime, skill.first, skill.second) == (ARM, RED, GREEN)
 
 
-def test_relative_poses_are_those_of_the_program(on: Skill, beside: Skill, push: Skill) -> None:
+def test_relative_poses_are_those_of_the_program(on: Skill, beside: Skill) -> None:
     """Grasped 15 mm below the top; sides aligned in the end; middle on middle, or side by side."""
     for skill in (on, beside):
         hand, placed = skill.hand, skill.placed
@@ -102,9 +103,6 @@ def test_relative_poses_are_those_of_the_program(on: Skill, beside: Skill, push:
     assert abs(beside.placed.gap_m) < 0.001
     assert beside.placed.facing_rad == pytest.approx(0.0, abs=0.03)
     assert beside.placed.aside_m == pytest.approx(0.035, abs=0.002)
-    # Who pushes keeps the fingers as they are, along the connection vector, and needs no pose.
-    assert (push.hand.closes, push.hand.frame, push.placed) == (False, "connection", None)
-    assert abs(push.hand.facing_rad) < 0.02
 
 
 @pytest.mark.parametrize("placing", ["on", "beside"])
@@ -113,13 +111,13 @@ def test_the_plan_takes_and_puts_as_the_program_would(placing: str, request: pyt
     scene = placing_scene(placing, SEED)  # type: ignore[arg-type]
     steps = plan(skill, things_in(view(scene), scene.camera), home_m=scene.home_m)
     moves = {move.name: move for step in steps for move in step.moves}
-    names = ["over", "down", "grasp", "lift", "carry", "lower", "bring", "release", "leave", "up", "home"]
+    names = ["over", "down", "grasp", "lift", "carry", "lower", "bring", "stand", "release", "leave", "up", "home"]
     assert list(moves) == (names if placing == "beside" else [name for name in names if name != "bring"])
     assert [step.rule.column for step in steps] == [rule.column for rule in skill.rules if rule.change != "AN"]
     red = scene.thing(RED)
     np.testing.assert_allclose(moves["grasp"].to_m, (*red.p_W_m[:2], red.size_m[2] - 0.015), atol=0.003)
     end, _ = placing_pose(placing, scene)  # type: ignore[arg-type]
-    np.testing.assert_allclose(moves["release"].to_m, (*end[:2], end[2] + red.size_m[2] / 2 - 0.013), atol=0.004)
+    np.testing.assert_allclose(moves["release"].to_m, (*end[:2], end[2] + red.size_m[2] / 2 - 0.015), atol=0.003)
     assert [name for name, move in moves.items() if move.gripper] == ["over", "grasp", "release"]
     facing = moves["down"].facing_rad
     assert facing is not None
@@ -128,18 +126,17 @@ def test_the_plan_takes_and_puts_as_the_program_would(placing: str, request: pyt
     assert moves["home"].to_m == scene.home_m
 
 
-def test_the_macro_has_the_eight_instructions_of_the_thesis(on: Skill, push: Skill) -> None:
-    for skill, scene in ((on, placing_scene("on", SEED)), (push, example_scene("a"))):
-        things = things_in(view(scene), scene.camera)
-        done = macro(skill, *check_scene(skill, things), things, home_m=scene.home_m)
-        assert [one.text for one in done.instructions] == list(INSTRUCTIONS)
-        assert done.instructions[0].result == ARM
-        assert all(one.result for one in done.instructions)
-        reached = [rule for one in done.instructions for segment in one.segments for rule in segment.rules]
-        assert sorted(reached, key=lambda rule: rule.column) == list(skill.rules)
-        assert [move for one in done.instructions for segment in one.segments for move in segment.moves] == [
-            move for step in done.steps for move in step.moves
-        ]
+def test_the_macro_has_the_eight_instructions_of_the_thesis(on: Skill) -> None:
+    scene = placing_scene("on", SEED)
+    things = things_in(view(scene), scene.camera)
+    done = macro(on, *check_scene(on, things), things, home_m=scene.home_m)
+    assert [one.text for one in done.instructions] == list(INSTRUCTIONS)
+    assert done.instructions[0].result == ARM
+    assert all(one.result for one in done.instructions)
+    # All rules are reached, and all moves made, by one of the three segments.
+    segments = [segment for one in done.instructions for segment in one.segments]
+    assert [rule for segment in segments for rule in segment.rules] == list(on.rules)
+    assert [segment.moves for segment in segments] == [step.moves for step in done.steps]
 
 
 @pytest.mark.parametrize(
@@ -148,7 +145,8 @@ def test_the_macro_has_the_eight_instructions_of_the_thesis(on: Skill, push: Ski
         ({2: _rule(3, GREEN, RED, "TN")}, r"got \{green box, red box\} T→N in column 4"),
         ({2: _rule(3, GREEN, ARM, "NT")}, r"got \{green box, robot arm\} N→T in column 4"),
         ({4: _rule(5, RED, ARM, "NT")}, r"at this time, got \{red box, robot arm\} N→T in column 6"),
-        ({1: _rule(2, RED, TABLE, "TN")}, "at this time"),
+        ({1: _rule(2, RED, TABLE, "TN")}, "expected transitions to touch"),
+        ({3: _rule(4, RED, TABLE, "TN")}, r"at this time, got \{red box, table\} T→N in column 5"),
         ({0: _rule(1, GREEN, TABLE, "TA")}, r"got \{green box, table\} T→A in column 2"),
         ({3: _rule(4, RED, ARM, "NA")}, "expected transitions to part"),
     ],
@@ -244,20 +242,15 @@ def test_gaps_above_each_other() -> None:
     assert raised(low, 0.0) is low
 
 
-def _fine(placing: str, scene: Scene, done: object) -> bool:
-    truth = done.truth  # type: ignore[attr-defined]
-    stands = bool(truth.touching(RED, TABLE)[-1]) == (placing == "beside")
-    return bool(truth.touching(RED, GREEN)[-1]) and stands
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("placing", ["on", "beside"])
 def test_the_arm_picks_and_places_and_judges_itself(placing: str, request: pytest.FixtureRequest) -> None:
     scene = placing_scene(placing, SEED, number=1)  # type: ignore[arg-type]
-    done = execute_skill(scene, request.getfixturevalue(placing), most_attempts=1)
-    assert [verdict.why for verdict in done.verdicts] == [""] * len(done.verdicts)
+    done = execute_skill(scene, request.getfixturevalue(placing))
     assert done.success
-    assert _fine(placing, scene, done)
+    assert all(verdict.agrees for verdict in done.verdicts if verdict.attempt == done.n_attempts - 1)
+    assert done.truth.touching(RED, GREEN)[-1]
+    assert done.truth.touching(RED, TABLE)[-1] == (placing == "beside")
     end, _ = placing_pose(placing, scene)  # type: ignore[arg-type]
     np.testing.assert_allclose(done.truth.poses[RED][-1][:3, 3], end, atol=0.005)
 
