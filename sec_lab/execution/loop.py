@@ -20,10 +20,16 @@ from sec_lab.worlds.katana.run import FRAMES_PER_SECOND
 _NUDGE_M, _TOUCH_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.003, 0.0005, 0.02, 6
 _PUSHED_M = 0.001
 """Who moves by this was touched: the second object's motion proves that the first has reached it."""
-_LOOSE_M, _MOST_OFF_M = 0.0005, 0.002
+_LOOSE_M, _MOST_OFF_M = 0.0003, 0.002
 """How much wider than while the one pushed the other their gap may look in the end; and how far off it may have looked
 then, when it was none."""
+_LET_GO_M = 0.0005
+"""The same of what was let go beside it, not pressed on."""
+_SPRUNG_M = 0.001
+"""How much more than while the one was pressed on the other, which makes both give way a little."""
 _MOST_ATTEMPTS = 4
+_SLOWER = 0.5
+"""Share of its speed at which the arm moves among the things after a failure."""
 _STILL_M, _LOOK_S, _MOST_LOOKS = 0.0004, 0.25, 8
 """Things rest if they have moved by less than this within the last frames; how long to wait for it, and how often."""
 _OVER_M = (0.15, 0.12, 0.10, 0.08)
@@ -193,6 +199,9 @@ def agreement(observation: Observation, skill: Skill, column: int) -> str:
         # On its way home the prime mover may be out of view a little early.
         if skill.prime in pair and got.endswith("A") and _compressed(row) == letters + "A":
             letters += "A"
+        # What looks as if it touched when a further attempt begins cannot be seen to begin it.
+        if pair == {skill.first, skill.second} and got.startswith("T"):
+            letters = got[0] if letters[-1] == "T" or got[-1] == "A" else got
         if got[-1] != letters[-1] or not _contains(got, letters):
             return f"{_told(pair)}: expected {letters}, got {got}"
     for pair, letters in seen.items():
@@ -214,7 +223,10 @@ def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None)
     """
     gap = perceived.last_gap_m(skill.first, skill.second)
     none = skill.contact_gap_m if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M)
-    most = none + _LOOSE_M
+    most = none + (_LET_GO_M if skill.hand.closes else _LOOSE_M)
+    if pressed_m is not None:
+        # Where both look larger than they are, it is how far they have sprung apart that tells.
+        most = min(most, pressed_m + _SPRUNG_M)
     if gap <= most:
         return ""
     pair = _told(frozenset((skill.first, skill.second)))
@@ -225,8 +237,14 @@ def _planned(run: Run, watcher: Watcher, scene: Scene, skill: Skill, *, again: b
     """A plan for what is seen now, all of it within the arm's reach from where it is."""
     things = watcher.add(run.view(), tip_m=run.tip_m)
     steps = plan(skill, things, home_m=scene.home_m, again=again)
+    if again:
+        steps = tuple(replace(step, moves=tuple(_slower(move, skill) for move in step.moves)) for step in steps)
     run.check(*(move for step in steps for move in step.moves))
     return steps
+
+
+def _slower(move: Move, skill: Skill) -> Move:
+    return replace(move, speed_m_s=_SLOWER * move.speed_m_s) if move.speed_m_s <= skill.speed_m_s else move
 
 
 def _shifted(step: Step, by_m: Floats) -> Step:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Failure = Literal["slips", "missed", "wrong object", "removed"]
-SEED, N_SCENES, N_PLANTED = 2015, 100, 6
+SEED, N_SCENES, N_PLANTED = 2016, 100, 6
 
 _MISSES_BY_M = 0.09
 _BINS_DEG = (0.0, 15.0, 30.0, 45.0)
