@@ -219,21 +219,6 @@ def jpeg_bytes(picture: NDArray[np.uint8], *, quality: int = _JPEG_QUALITY) -> b
     return data.tobytes()
 
 
-def png_file(picture: NDArray[np.uint8]) -> bytes:
-    r"""RGB picture as a PNG file, fast rather than small.
-
-    Examples
-    --------
-    >>> png_file(np.zeros((4, 4, 3), dtype=np.uint8))[:4]
-    b'\x89PNG'
-    """
-    import cv2
-
-    done, data = cv2.imencode(".png", picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
-    assert done
-    return data.tobytes()
-
-
 def told_segment(label: int, names: Names) -> str:
     """What a segment is called in sentences and lists.
 
