@@ -95,6 +95,9 @@ def test_frames_between_masks_are_kept_and_a_longer_mask_than_movie_is_refused()
     found = see(few, recording=movie())
     assert [frame.number for frame in found.frames] == list(range(12))
     assert [frame.number for frame in found.frames if frame.has_labels] == [0, 3, 6, 9]
+    # What is shown between two masks is the last one.
+    assert np.array_equal(found.frames[5].shown_labels, labels[1])
+    assert found.frames[5].labels is None
     unknown = replace(movie(5), n_frames=None)
     with pytest.raises(ValueError, match="got one of frame 6"):
         see(few, recording=unknown)
@@ -242,6 +245,8 @@ def test_graphs_without_pictures_have_an_explorer_too() -> None:
         book.observation.chain.relations, merge_segments(Observation(graphs, [3, 8, 20]), [[2, 3]]).chain.relations
     )
     assert "3 frames" not in scrubber_html(book)
+    with_movie = ChainBook(see(Observation(graphs, [3, 8, 20]), recording=movie(25)))
+    assert with_movie.panels.draw(with_movie.frame, column=0).shape[1] == 2 * 7 * 60 + 6
 
 
 def test_pictures_larger_than_those_that_are_kept() -> None:

@@ -57,15 +57,13 @@ class FramePanels:
         self._recorded = observation.recorded
         self._new_labels = new_labels
         segments = observation.segments.tolist()
-        self._is_filmed = sample is not None
         self._size = _size_of(sample)
         height, width = self._size
         self.scale = max(1, -(-_LEAST_HIGH // height)) if width <= _MOST_WIDE // 2 else 1
         self._high, self._wide = self.scale * height, self.scale * width
         is_pictured = sample is not None and sample.picture is not None
-        has_labels = sample is not None and sample.has_labels
         self._kinds: list[str] = ["picture"] if is_pictured else []
-        self._kinds += ["graph"] if has_labels or not is_pictured else []
+        self._kinds += ["graph"]
         self._kinds += ["depth"] if has_depth else []
         self._tint = Tint(segments, background=background, border_px=1)
         self._paper_tint = Tint(segments, background=background, border_px=1)
@@ -115,8 +113,8 @@ class FramePanels:
         return jpeg_bytes(self.draw(frame, column=column, pair=pair, chosen=chosen))
 
     def labels_of(self, frame: KeptFrame | None) -> Labels | None:
-        """Label image of a frame, with fragments merged."""
-        labels = None if frame is None else frame.labels
+        """Label image of a frame, or the last one before it, with fragments merged."""
+        labels = None if frame is None else frame.shown_labels
         return labels if labels is None or self._new_labels is None else self._new_labels[labels]
 
     def segment_at(self, frame: KeptFrame | None, x: int, y: int) -> int | None:
@@ -217,21 +215,6 @@ def jpeg_bytes(picture: NDArray[np.uint8], *, quality: int = _JPEG_QUALITY) -> b
     options = [cv2.IMWRITE_JPEG_QUALITY, quality]
     options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
     done, data = cv2.imencode(".jpg", picture[..., ::-1], options)
-    assert done
-    return data.tobytes()
-
-
-def png_file(picture: NDArray[np.uint8]) -> bytes:
-    r"""RGB picture as a PNG file, fast rather than small.
-
-    Examples
-    --------
-    >>> png_file(np.zeros((4, 4, 3), dtype=np.uint8))[:4]
-    b'\x89PNG'
-    """
-    import cv2
-
-    done, data = cv2.imencode(".png", picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
     assert done
     return data.tobytes()
 

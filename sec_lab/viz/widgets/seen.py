@@ -2,9 +2,10 @@
 
 import os
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -48,7 +49,7 @@ class KeptFrame:
     (array([[  1, 300]], dtype=uint16), True)
     """
 
-    __slots__ = ("_depth", "_labels", "_picture", "_size", "number", "time_s")
+    __slots__ = ("_depth", "_held", "_labels", "_picture", "_size", "number", "time_s")
 
     def __init__(
         self,
@@ -61,6 +62,7 @@ class KeptFrame:
         self.number, self.time_s = number, time_s
         self._picture = None if picture is None else _jpeg(picture)
         self._labels = None if labels is None else _png(labels)
+        self._held = self._labels
         self._depth = None if depth_m is None else zlib.compress(depth_m.astype(np.float32).tobytes(), 1)
         self._size = None if depth_m is None else depth_m.shape
 
@@ -88,9 +90,17 @@ class KeptFrame:
     @property
     def labels(self) -> Labels | None:
         """Label image."""
-        import cv2
+        return None if self._labels is None else _decoded(self._labels)
 
-        return None if self._labels is None else np.asarray(cv2.imdecode(self._labels, cv2.IMREAD_UNCHANGED))
+    @property
+    def shown_labels(self) -> Labels | None:
+        """Label image, or the last one before this frame, if it has none of its own."""
+        return None if self._held is None else _decoded(self._held)
+
+    def follow(self, before: "KeptFrame") -> None:
+        """Hold the label image of the frame before, if there is none of its own."""
+        if self._labels is None:
+            self._held = before._held
 
     @property
     def depth_m(self) -> NDArray[np.float32] | None:
@@ -192,7 +202,7 @@ def see(
     """
     movie = Recording.open(recording) if recording is not None and not isinstance(recording, Recording) else recording
     if isinstance(source, Observation):
-        frames = tuple(_kept(movie, source.segmentation, tell))
+        frames = _followed(_kept(movie, source.segmentation, tell))
         background = None if source.segmentation is None else source.segmentation.background
         if names is not None:
             source = Observation(source.graphs, source.key_frames, names, source.position_unit, source.segmentation)
@@ -213,7 +223,7 @@ def see(
             method = segmenter(labelled)
         segment = partial(keeper.segment, method)
         found = observe(movie, segmentation=segment, over_time=how[0], relations=how[1], names=names)
-    kept = tuple(keeper.frames)
+    kept = _followed(keeper.frames)
     assert found.segmentation is not None
     background = found.segmentation.background
     again = replace_segmentation(found, _segmentation_of(kept, background, found.names))
@@ -423,6 +433,19 @@ def _jpeg(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     done, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     assert done
     return np.asarray(data, dtype=np.uint8)
+
+
+def _decoded(labels: NDArray[np.uint8]) -> Labels:
+    import cv2
+
+    return np.asarray(cv2.imdecode(labels, cv2.IMREAD_UNCHANGED))
+
+
+def _followed(frames: Iterable[KeptFrame]) -> tuple[KeptFrame, ...]:
+    kept = tuple(frames)
+    for before, frame in pairwise(kept):
+        frame.follow(before)
+    return kept
 
 
 def _png(labels: Labels) -> NDArray[np.uint8]:
