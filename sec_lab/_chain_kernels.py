@@ -29,6 +29,8 @@ LANES = 4
 MAX_ROWS = 2**16 - 1
 """Rows that a lane can count."""
 
+_NIBBLES = 16
+
 SLACK = 1e-9
 """Room for rounding when similarities are compared up to a tolerance in percent."""
 
@@ -52,12 +54,47 @@ def row_similarity(a: Codes, b: Codes, shorter: int) -> float:
 def row_similarities_of_kinds(
     symbols: Codes, starts: Integers, first: int, last: int, shorter: int, out: Numbers
 ) -> None:
-    """Fill rows ``first:last`` of the symmetric table of similarities between all kinds of compressed rows."""
+    """Fill rows ``first:last`` of the symmetric table of similarities between all kinds of compressed rows.
+
+    Symbols below 16 fit into half a byte: two rows of at most 15 are compared as two words, all their places at once.
+    """
+    n_kinds = len(starts) - 1
+    words, fits = np.zeros(n_kinds, np.uint64), np.ones(n_kinds, np.bool_)
+    for kind in range(n_kinds):
+        n = starts[kind + 1] - starts[kind]
+        fits[kind] = n < _NIBBLES
+        for i in range(n):
+            symbol = symbols[starts[kind] + i]
+            fits[kind] &= symbol < _NIBBLES
+            if fits[kind]:
+                words[kind] |= np.uint64(symbol) << np.uint64(4 * i)
     for i in range(first, last):
         a = symbols[starts[i] : starts[i + 1]]
-        for j in range(i, len(starts) - 1):
-            out[i, j] = row_similarity(a, symbols[starts[j] : starts[j + 1]], shorter)
+        for j in range(i, n_kinds):
+            if fits[i] and fits[j]:
+                n_b = starts[j + 1] - starts[j]
+                best, n, longer = best_overlap(words[i], len(a), words[j], n_b)
+                out[i, j] = 100.0 * best / (n if shorter else longer)
+            else:
+                out[i, j] = row_similarity(a, symbols[starts[j] : starts[j + 1]], shorter)
             out[j, i] = out[i, j]
+
+
+@compiled
+def best_overlap(a: np.uint64, n_a: int, b: np.uint64, n_b: int) -> tuple[int, int, int]:
+    """Most equal places of the shorter of two rows laid over the longer, and both lengths; half a byte a place."""
+    if n_a > n_b:
+        a, n_a, b, n_b = b, n_b, a, n_a
+    ones = np.uint64(0x1111111111111111) & ((np.uint64(1) << np.uint64(4 * n_a)) - np.uint64(1))
+    fewest = n_a
+    for _ in range(n_b - n_a + 1):
+        different = a ^ b
+        different |= different >> np.uint64(1)
+        different |= different >> np.uint64(2)
+        count = int(((different & ones) * np.uint64(0x1111111111111111)) >> np.uint64(60))
+        fewest = min(fewest, count)
+        b >>= np.uint64(4)
+    return n_a - fewest, n_a, n_b
 
 
 @compiled
@@ -104,6 +141,41 @@ def fill_lanes(codes: Codes, n_rows: int, n_columns: int, n_codes: int, lanes: W
         for b in range(n_columns):
             word = at + (i * n_codes + codes[i * n_columns + b]) * n_words + b // LANES
             lanes[word] |= np.uint64(1) << np.uint64(16 * (b % LANES))
+
+
+@compiled
+def fill_all_lanes(
+    codes: Codes, starts: Integers, n_rows: Integers, n_columns: Integers, n_codes: int, lanes: Words, at: Integers
+) -> None:
+    """:func:`fill_lanes` for chain after chain."""
+    for i in range(len(n_rows)):
+        fill_lanes(codes[starts[i] : starts[i + 1]], n_rows[i], n_columns[i], n_codes, lanes, at[i])
+
+
+@compiled
+def describe_rows(
+    codes: Codes, n_rows: Integers, n_columns: Integers, n_codes: int, first: Integers, symbols: Codes, starts: Integers
+) -> None:
+    """For each row of all chains the first one of its chain with the same entries, and its changes in their order.
+
+    The changes of row r (ξ_c) lie in ``symbols`` from ``starts[r]`` on, as ``n_codes`` × before + after.
+    """
+    row = at = end = 0
+    for chain in range(len(n_rows)):
+        u, base = n_columns[chain], at
+        for _ in range(n_rows[chain]):
+            starts[row] = end
+            for x in range(1, u):
+                if codes[at + x] != codes[at + x - 1]:
+                    symbols[end] = n_codes * codes[at + x - 1] + codes[at + x]
+                    end += 1
+            j = 0
+            while not np.array_equal(codes[base + j * u : base + (j + 1) * u], codes[at : at + u]):
+                j += 1
+            first[row] = j
+            at += u
+            row += 1
+    starts[row] = end
 
 
 @compiled

@@ -1,6 +1,7 @@
 """Event chains laid out in flat arrays for the compiled loops of :mod:`sec_lab._similarity_kernels`."""
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,31 +46,43 @@ class PackedChains:
     def __init__(self, chains: Sequence[EventChain], names: Sequence[str], *, derived: bool) -> None:
         if not len(chains):
             raise ValueError("chains: expected at least one event chain, got none")
-        codes: list[NDArray[np.uint8]] = []
-        first: list[int] = []
-        kinds: dict[bytes, int] = {}
-        kind_of_row: list[int] = []
+        tables = []
         for chain, name in zip(chains, names, strict=True):
-            check_comparable(chain, name)
-            rows = _CODE_OF_RELATION[chain.relations[chain.changing_rows]]
-            codes.append(N_RELATIONS * rows[:, :-1] + rows[:, 1:] if derived else rows)
-            seen: dict[bytes, int] = {}
-            first += [seen.setdefault(row.tobytes(), i) for i, row in enumerate(rows)]
-            kind_of_row += [kinds.setdefault(row.tobytes(), len(kinds)) for row in chain.compressed]
-        self.n_codes = N_RELATIONS**2 if derived else N_RELATIONS
-        self.n_rows = np.array([rows.shape[0] for rows in codes], np.int64)
-        self.n_columns = np.array([rows.shape[1] for rows in codes], np.int64)
+            changing = check_comparable(chain, name)
+            tables.append(_CODE_OF_RELATION[chain.relations[changing]])
+        self._lay_out(tables, derived=derived)
+
+    @classmethod
+    def of_tables(cls, tables: Sequence[NDArray[np.uint8]]) -> "PackedChains":
+        """Lay out tables of codes, every row of which changes, for the comparison of ξ_o."""
+        packed = cls.__new__(cls)
+        packed._lay_out(tables, derived=False)
+        return packed
+
+    def _lay_out(self, tables: Sequence[NDArray[np.uint8]], *, derived: bool) -> None:
+        shapes = np.array([rows.shape for rows in tables], np.int64)
+        self.n_rows, n_columns = shapes[:, 0].copy(), shapes[:, 1].copy()
         self.row_starts = _starts(self.n_rows)
-        self.code_starts = _starts(self.n_rows * self.n_columns)
-        self.lane_starts = _starts(self.n_rows * self.n_codes * -(-self.n_columns // kernels.LANES))
-        self.codes = np.concatenate([rows.ravel() for rows in codes])
-        self.first = np.array(first, np.int64)
-        self.kinds = np.array(kind_of_row, np.int64)
+        given = np.concatenate([rows.ravel() for rows in tables])
+        self.first = np.empty(self.row_starts[-1], np.int64)
+        symbols, starts = np.empty(len(given), np.uint8), np.empty(len(self.first) + 1, np.int64)
+        kernels.describe_rows(given, self.n_rows, n_columns, N_RELATIONS, self.first, symbols, starts)
+        kinds: dict[bytes, int] = {}
+        text, ends = symbols.tobytes(), starts.tolist()
+        self.kinds = np.array([kinds.setdefault(text[a:b], len(kinds)) for a, b in pairwise(ends)], np.int64)
         self.symbols = np.frombuffer(b"".join(kinds), np.uint8)
         self.symbol_starts = _starts(np.array([len(kind) for kind in kinds]))
+        if derived:
+            tables = [N_RELATIONS * rows[:, :-1] + rows[:, 1:] for rows in tables]
+        self.n_codes = N_RELATIONS**2 if derived else N_RELATIONS
+        self.n_columns = n_columns - derived
+        self.codes = np.concatenate([rows.ravel() for rows in tables]) if derived else given
+        self.code_starts = _starts(self.n_rows * self.n_columns)
+        self.lane_starts = _starts(self.n_rows * self.n_codes * -(-self.n_columns // kernels.LANES))
         self.lanes = np.zeros(self.lane_starts[-1], np.uint64)
-        for i, rows in enumerate(codes):
-            kernels.fill_lanes(rows.ravel(), *rows.shape, self.n_codes, self.lanes, self.lane_starts[i])
+        kernels.fill_all_lanes(
+            self.codes, self.code_starts, self.n_rows, self.n_columns, self.n_codes, self.lanes, self.lane_starts
+        )
 
     def symbols_of(self, row: int) -> NDArray[np.uint8]:
         """Compressed form of a row, counted through all chains."""
@@ -89,8 +102,8 @@ class PackedChains:
         return equal
 
 
-def check_comparable(chain: EventChain, name: str) -> None:
-    """Refuse a chain that nothing can be compared with.
+def check_comparable(chain: EventChain, name: str) -> NDArray[np.intp]:
+    """Numbers of the rows of a chain that change; refuses a chain that nothing can be compared with.
 
     Parameters
     ----------
@@ -107,13 +120,15 @@ def check_comparable(chain: EventChain, name: str) -> None:
     """
     if not isinstance(chain, EventChain):
         raise TypeError(f"{name}: expected an event chain, got {type(chain).__name__}")
-    n_changing = len(chain.changing_rows)
+    changing = chain.changing_rows
+    n_changing = len(changing)
     if chain.relations.shape[1] < 2:
         raise ValueError(f"{name}: expected an event chain of at least two columns, got one")
     if not n_changing:
         raise ValueError(f"{name}: expected an event chain with a change, but no row of it ever changes")
     if n_changing > kernels.MAX_ROWS:
         raise ValueError(f"{name}: expected at most {kernels.MAX_ROWS} changing rows, got {n_changing}")
+    return changing
 
 
 def _starts(lengths: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab import _learning_kernels as kernels
+from sec_lab import _profile_kernels as growing
+from sec_lab._chain_kernels import MAX_ROWS
 from sec_lab.event_chain import EventChain
 
-LEAST_COUNT = 2
+LEAST_COUNT = growing.LEAST_COUNT
 """Demonstrations that a row or column needs to be common to some."""
 
 RELATION_OF_CODE = np.array([0, 1, 2, 9], np.uint8)
-
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Options:
 
     def often(self, counts: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
         """Rows or columns that enough of n demonstrations have."""
-        return (counts >= self.threshold * n - _ROUNDING) & (counts >= min(LEAST_COUNT, n))
+        return np.asarray(growing.often(counts, n, self.threshold), np.bool_)
 
 
 class Packed:
@@ -85,6 +85,10 @@ class Packed:
         for wrong, what in (
             (self.n_columns < 2, "expected an event chain of at least two columns, got one"),
             (self.n_changing == 0, "expected an event chain with a change, but no row of it ever changes"),
+            (
+                self.n_changing > MAX_ROWS,
+                f"expected at most {MAX_ROWS} changing rows, got {self.n_changing.max(initial=0)}",
+            ),
             (self.key_frames[self.frame_starts[:-1]] < 0, "expected frame numbers from 0 on, got a negative one"),
         ):
             if wrong.any():
@@ -93,11 +97,6 @@ class Packed:
     def codes_of(self, i: int) -> NDArray[np.uint8]:
         """Codes of the changing rows of one chain."""
         return self.codes[self.code_starts[i] : self.code_starts[i + 1]].reshape(self.n_changing[i], -1)
-
-    def chain_of(self, i: int) -> EventChain:
-        """The changing rows of one chain as a chain of its own."""
-        first, last = self.row_starts[i : i + 2]
-        return EventChain(RELATION_OF_CODE[self.codes_of(i)], self.pairs[first:last])
 
 
 class Profile:
@@ -112,6 +111,8 @@ class Profile:
     ----------
     votes : (n_rows, n_columns, 4) int64
         How often each code was seen where a row and a column of a demonstration both correspond.
+    initial : (n_rows, n_columns) uint8
+        What counts where nobody voted, or in a tie.
     row_counts, column_counts : int64
         Demonstrations that have each.
     n : int
@@ -122,10 +123,26 @@ class Profile:
         m, u = codes.shape
         self.options = options
         self.n = 1
-        self.initial = codes.copy()
-        self.votes = np.eye(kernels.N_CODES, dtype=np.int64)[codes]
-        self.row_counts, self.column_counts = np.ones(m, np.int64), np.ones(u, np.int64)
-        self._row_missed, self._column_missed = np.zeros(m, np.int64), np.zeros(u, np.int64)
+        self._state: growing.State = (
+            np.eye(kernels.N_CODES, dtype=np.int64)[codes], codes.copy(), np.ones(m, np.int64), np.zeros(m, np.int64),
+            np.ones(u, np.int64), np.zeros(u, np.int64),
+        )  # fmt: skip
+
+    @property
+    def votes(self) -> NDArray[np.int64]:
+        return self._state[0]
+
+    @property
+    def initial(self) -> NDArray[np.uint8]:
+        return self._state[1]
+
+    @property
+    def row_counts(self) -> NDArray[np.int64]:
+        return self._state[2]
+
+    @property
+    def column_counts(self) -> NDArray[np.int64]:
+        return self._state[4]
 
     @property
     def codes(self) -> NDArray[np.uint8]:
@@ -135,7 +152,7 @@ class Profile:
     @property
     def strong(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Rows and columns that enough demonstrations have."""
-        return tuple(self.options.often(counts, self.n) for counts in (self.row_counts, self.column_counts))  # type: ignore[return-value]
+        return self.options.often(self.row_counts, self.n), self.options.often(self.column_counts, self.n)
 
     def align(self, codes: NDArray[np.uint8]) -> Alignment:
         """Rows and columns of the model in a chain."""
@@ -149,54 +166,21 @@ class Profile:
 
     def add(self, codes: NDArray[np.uint8], alignment: Alignment) -> None:
         """Raise the weights of what the chain has too, and append what it has besides."""
-        rows, columns = self._append(codes, alignment)
-        self.n += 1
-        self.row_counts[rows >= 0] += 1
-        self.column_counts[columns >= 0] += 1
-        i, x = np.flatnonzero(rows >= 0), np.flatnonzero(columns >= 0)
-        self.votes[i[:, None], x, codes[rows[i][:, None], columns[x]]] += 1
-        width = int(np.ceil(2 / self.options.threshold)) if self.options.threshold > 0 else self.n + 1
-        if self.n % width == 0:
-            bucket = self.n // width
-            keep_rows = self.row_counts + self._row_missed > bucket
-            keep_columns = self.column_counts + self._column_missed > bucket
-            if keep_rows.any() and keep_columns.any():
-                self._keep(keep_rows, keep_columns)
-
-    def _append(self, codes: NDArray[np.uint8], alignment: Alignment) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Make room for the rows and columns of a chain that the model lacks; returns all partners."""
-        u = self.initial.shape[1]
         # Departure: unseen columns are inserted too, so that a first example without some event can be outgrown.
-        new_columns = np.setdiff1d(np.arange(codes.shape[1]), alignment.columns)
-        aligned = np.flatnonzero(alignment.columns >= 0)
-        before = np.searchsorted(alignment.columns[aligned], new_columns)
-        at = np.where(before > 0, aligned[before - 1] + 1, 0) if len(aligned) else np.full(len(new_columns), u)
-        new_rows = np.setdiff1d(np.arange(len(codes)), alignment.rows)
-        columns = np.insert(alignment.columns, at, new_columns)
-        rows = np.append(alignment.rows, new_rows)
-        # Where nothing was seen yet, a relation lasts until it is seen to change.
-        held = np.take(self.codes, np.maximum(at - 1, 0), axis=1)
-        self.initial = np.insert(self.initial, at, held, axis=1)
-        self.votes = np.insert(self.votes, at, 0, axis=1)
-        partner = np.where(columns >= 0, np.arange(len(columns)), -1)
-        last = columns[np.maximum(np.maximum.accumulate(partner), 0)]
-        appended = codes[new_rows][:, np.where(last >= 0, last, 0)]
-        self.initial = np.vstack([self.initial, appended])
-        self.votes = np.concatenate([self.votes, np.zeros((len(new_rows), *self.votes.shape[1:]), np.int64)])
-        width = int(np.ceil(2 / self.options.threshold)) if self.options.threshold > 0 else self.n + 1
-        self.row_counts = np.append(self.row_counts, np.zeros(len(new_rows), np.int64))
-        self._row_missed = np.append(self._row_missed, np.full(len(new_rows), self.n // width))
-        self.column_counts = np.insert(self.column_counts, at, 0)
-        self._column_missed = np.insert(self._column_missed, at, self.n // width)
-        return rows, columns
+        threshold = self.options.threshold
+        self._state = growing.add(self._state, self.n, codes, alignment.rows, alignment.columns, threshold)
+        self.n += 1
 
-    def _keep(self, rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> None:
-        self.votes, self.initial = self.votes[rows][:, columns], self.initial[rows][:, columns]
-        self.row_counts, self._row_missed = self.row_counts[rows], self._row_missed[rows]
-        self.column_counts, self._column_missed = self.column_counts[columns], self._column_missed[columns]
+    def add_all(self, packed: Packed, order: NDArray[np.int64]) -> None:
+        """Align and add demonstrations, one after the other."""
+        options = self.options
+        self._state = growing.grow(
+            self._state, self.n, order, packed.codes, packed.code_starts, packed.n_changing, packed.n_columns,
+            options.threshold, int(options.shorter), options.tolerance_percent, options.effort,
+        )  # fmt: skip
+        self.n += len(order)
 
 
 def most_voted(votes: NDArray[np.int64], initial: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Code with most votes in every place; of a tie, and where nobody voted, the one that was there first."""
-    first = np.eye(kernels.N_CODES, dtype=np.int64)[initial]
-    return np.asarray(np.argmax(2 * votes + first, axis=-1), np.uint8)
+    return np.asarray(growing.most_voted(votes, initial), np.uint8)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Names = Mapping[int, str | None]
+_NO_NAMES: Names = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,26 @@ class EventChain:
         object.__setattr__(self, "pairs", labels)
         object.__setattr__(self, "key_frames", frames)
         object.__setattr__(self, "names", as_names(names))
+
+    @classmethod
+    def unchecked(cls, relations: Relations, pairs: NDArray[np.int64], names: Names) -> "EventChain":
+        """Chain of arrays that are known to be right, without a copy and without a look at them; numbered key frames.
+
+        Parameters
+        ----------
+        relations : (n_pairs, n_key_frames) uint8
+        pairs : (n_pairs, 2) int64
+            Both belong to the chain from now on.
+        names : mapping of int to str or None
+            Of another chain.
+        """
+        chain = object.__new__(cls)
+        frames = np.arange(relations.shape[1])
+        for name, array in (("relations", relations), ("pairs", pairs), ("key_frames", frames)):
+            array.setflags(write=False)
+            object.__setattr__(chain, name, array)
+        object.__setattr__(chain, "names", names)
+        return chain
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.relations, self.pairs, self.key_frames, dict(self.names))
@@ -185,9 +206,11 @@ def as_names(names: Names | None) -> Names:
     ...
     ValueError: names: expected text or None, got 3.5
     """
-    if not isinstance(names, Mapping | None):
+    if names is None:
+        return _NO_NAMES
+    if not isinstance(names, Mapping):
         raise ValueError(f"names: expected a mapping of segments to names, got {type(names).__name__}")
-    given = dict(names or {})
+    given = dict(names)
     labels = as_integers(list(given), what="labels of names", ndim=1)
     for name in given.values():
         if not isinstance(name, str | None):
@@ -200,9 +223,11 @@ def _check_pairs(pairs: NDArray[np.int64]) -> None:
     itself = pairs[:, 0] == pairs[:, 1]
     if itself.any():
         raise ValueError(f"pairs: expected two different segments, got {tuple(pairs[itself][0].tolist())}")
-    labels, ranks = np.unique(pairs, return_inverse=True)
-    low, high = np.sort(ranks.reshape(pairs.shape), axis=1).T
-    unordered, count = np.unique(low * len(labels) + high, return_counts=True)
-    if (count > 1).any():
-        twice = divmod(int(unordered[count > 1][0]), len(labels))
-        raise ValueError(f"pairs: expected each pair once, got {tuple(labels[list(twice)].tolist())} twice")
+    # Pairs in one order of labels, one below the other: the same pair twice makes two neighbours alike.
+    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    order = np.lexsort((high, low))
+    low, high = low[order], high[order]
+    again = np.flatnonzero((low[1:] == low[:-1]) & (high[1:] == high[:-1]))
+    if again.size:
+        twice = int(low[again[0]]), int(high[again[0]])
+        raise ValueError(f"pairs: expected each pair once, got {twice} twice")

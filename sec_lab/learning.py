@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from sec_lab import _learning_kernels as kernels
 from sec_lab._model_making import Ballot, Frame, make_model, often_enough
+from sec_lab._packed_chains import PackedChains
 from sec_lab._profile import LEAST_COUNT, Options, Packed, Profile
 from sec_lab.action_model import ActionModel
 from sec_lab.event_chain import EventChain
 from sec_lab.observation import Observation
-from sec_lab.similarity import EFFORT, Normalizer, check_options, pairwise_similarity
+from sec_lab.similarity import EFFORT, Normalizer, check_options, temporal_of_packed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,7 +116,7 @@ def learn(
     if len(given) < LEAST_COUNT:
         raise ValueError(f"demonstrations: expected at least two, got {len(given)}")
     packed = Packed([_chain_of(one) for one in given], names)
-    frame = _gather(packed, options)
+    frame = _gather(packed, options, n_threads)
     # A part of the demonstrations settles what is deleted, all of them have the last word; then again without that, so
     # that nothing of a demonstration is lost to it.
     some = np.unique(np.linspace(0, len(given) - 1, min(len(given), _SETTLING)).astype(int))
@@ -314,21 +315,19 @@ def learn_types(
     return LearnedTypes(table, classes, tuple(models))
 
 
-def _gather(packed: Packed, options: Options) -> Frame:
+def _gather(packed: Packed, options: Options, n_threads: int | None) -> Frame:
     """Rows and columns of a sample of the demonstrations, the most typical one first."""
     n = len(packed.n_columns)
-    sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLE)).astype(int)).tolist()
-    table = pairwise_similarity(
-        [packed.chain_of(i) for i in sample], normalizer="shorter" if options.shorter else "longer",
-        tolerance_percent=options.tolerance_percent, effort=options.effort, measures=("temporal",),
-    ).temporal  # fmt: skip
+    sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLE)).astype(np.int64))
+    table = temporal_of_packed(
+        PackedChains.of_tables([packed.codes_of(i) for i in sample]), shorter=options.shorter,
+        tolerance_percent=options.tolerance_percent, effort=options.effort, n_threads=n_threads,
+    )  # fmt: skip
     both = (table + table.T) / 2
     typical = int(np.argmax(both.sum(axis=1)))
     profile = Profile(packed.codes_of(sample[typical]), options)
-    for i in np.argsort(-both[typical], kind="stable").tolist():
-        if i != typical:
-            codes = packed.codes_of(sample[i])
-            profile.add(codes, profile.align(codes))
+    order = np.argsort(-both[typical], kind="stable")
+    profile.add_all(packed, sample[order[order != typical]])
     strong_rows, strong_columns = profile.strong
     likely = profile.row_counts >= LEAST_COUNT, profile.column_counts >= LEAST_COUNT
     rows, columns = (

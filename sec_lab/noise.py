@@ -123,7 +123,7 @@ class NoisySamples(Sequence[EventChain]):
         if isinstance(i, slice):
             return NoisySamples(self.seed, self.relations[i], self.rows[i], self.columns[i], self.pairs[i])
         rows, columns = self.rows[i], self.columns[i]
-        return EventChain(self.relations[i][rows][:, columns], self.pairs[i][rows], names=self.seed.names)
+        return EventChain.unchecked(self.relations[i][rows][:, columns], self.pairs[i][rows], self.seed.names)
 
 
 def noisy_samples(

@@ -263,6 +263,21 @@ def pairwise_similarity(
     return PairwiseSimilarity(spatial, temporal, exact)
 
 
+def temporal_of_packed(
+    packed: PackedChains, *, shorter: bool, tolerance_percent: float, effort: int, n_threads: int | None
+) -> NDArray[np.float64]:
+    """Directed ψ_temporal of every pair of chains that are laid out already, (n, n) float64."""
+    n = len(packed.n_rows)
+    temporal = np.empty((n, n))
+    normalizer: Normalizer = "shorter" if shorter else "longer"
+    exact = np.empty((n, n), np.bool_)
+    _fill(
+        packed, normalizer, tolerance_percent, effort, "directed", np.empty((0, 0)), temporal, exact, n_threads,
+        progress=False,
+    )  # fmt: skip
+    return temporal
+
+
 def similarity_table(
     chains: Sequence[EventChain] | Mapping[str, EventChain],
     *,
@@ -454,7 +469,12 @@ def _fill(
         )  # fmt: skip
         return n_exact
 
-    with ThreadPoolExecutor(n_threads or len(os.sched_getaffinity(0))) as pool:
+    n_workers = n_threads or len(os.sched_getaffinity(0))
+    if n_workers == 1 and not progress:
+        if kind_table.size:
+            tabulate((0, n_kinds))
+        return sum(map(task, range(n_seeds or n)))
+    with ThreadPoolExecutor(n_workers) as pool:
         try:
             if kind_table.size:
                 edges = np.unique(np.linspace(0, n_kinds, 65).astype(int)).tolist()
