@@ -102,7 +102,13 @@ class Outcome:
 
 
 def execute_skill(
-    scene: Scene, skill: Skill, *, fault: Fault | None = None, most_attempts: int = _MOST_ATTEMPTS
+    scene: Scene,
+    skill: Skill,
+    *,
+    fault: Fault | None = None,
+    most_attempts: int = _MOST_ATTEMPTS,
+    run: Run | None = None,
+    tell: Callable[[Sequence[Step], Sequence[Verdict]], object] | None = None,
 ) -> Outcome:
     """Let the arm do what it has learned, in a scene as the camera sees it.
 
@@ -114,6 +120,10 @@ def execute_skill(
     fault : Fault, optional
         What goes wrong.
     most_attempts : int, optional
+    run : Run, optional
+        Of this scene, watched, in which nothing has moved yet; for those who show it meanwhile. It has its own fault.
+    tell : callable, optional
+        Is told the plan of the attempt and all verdicts so far, whenever there is a new plan or verdict.
 
     Returns
     -------
@@ -124,12 +134,14 @@ def execute_skill(
     SceneError, UnreachableError
         At the first look, before anything moves: nothing can be done, or not by this arm.
     """
-    run = Run(scene, fault=fault, watched=True)
+    run = Run(scene, fault=fault, watched=True) if run is None else run
     watcher = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND)
     steps = _planned(run, watcher, scene, skill, again=False)
     verdicts: list[Verdict] = []
     attempt, gave_up = 0, ""
     while True:
+        if tell is not None:
+            tell(steps, tuple(verdicts))
         seen = _seen_from(run, watcher, run.n_frames)
         agrees, pressed, further = True, None, np.zeros(3)
         for planned in steps:
@@ -142,6 +154,8 @@ def execute_skill(
             if not why and step.column_is_last:
                 why = loose(perceived, skill, pressed_m=pressed)
             verdicts.append(Verdict(attempt, told(step.rule), len(watcher), not why, why))
+            if tell is not None:
+                tell(steps, tuple(verdicts))
             if why:
                 agrees = False
                 break

@@ -6,14 +6,15 @@ manipulation, beside them as GraphML (A.2).
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
 from sec_lab.execution.enriched_files import read_enriched_folder, write_enriched
-from sec_lab.execution.loop import Outcome, execute_skill
+from sec_lab.execution.loop import Outcome, Verdict, execute_skill
+from sec_lab.execution.motion import Run
 from sec_lab.execution.perception import perceive
-from sec_lab.execution.planning import Demonstrated, Skill, learn_skill
+from sec_lab.execution.planning import Demonstrated, Skill, Step, learn_skill
 from sec_lab.worlds.katana.records import Fault, Scene
 from sec_lab.worlds.katana.stored import read_demonstration
 
@@ -21,7 +22,14 @@ DEMONSTRATIONS = Path(__file__).parents[2] / "datasets" / "katana_pushing"
 """The ten demonstrations of the repository."""
 
 
-def push(scene: Scene, *, skill: Skill | None = None, fault: Fault | None = None) -> Outcome:
+def push(
+    scene: Scene,
+    *,
+    skill: Skill | None = None,
+    fault: Fault | None = None,
+    run: Run | None = None,
+    tell: Callable[[Sequence[Step], Sequence[Verdict]], object] | None = None,
+) -> Outcome:
     """Let the arm push the red thing to the green box, watch itself, and judge.
 
     Parameters
@@ -32,6 +40,9 @@ def push(scene: Scene, *, skill: Skill | None = None, fault: Fault | None = None
         What it has learned; :func:`pushing_skill` if left out.
     fault : Fault, optional
         What goes wrong.
+    run : Run, optional
+    tell : callable, optional
+        For those who look on; see :func:`~sec_lab.execution.loop.execute_skill`.
 
     Returns
     -------
@@ -53,7 +64,7 @@ def push(scene: Scene, *, skill: Skill | None = None, fault: Fault | None = None
     ...
     sec_lab.execution.planning.SceneError: scene: expected something that looks like 'red box', got [...]
     """
-    return execute_skill(scene, pushing_skill() if skill is None else skill, fault=fault)
+    return execute_skill(scene, pushing_skill() if skill is None else skill, fault=fault, run=run, tell=tell)
 
 
 @lru_cache(maxsize=1)

@@ -4,7 +4,7 @@ import base64
 import gzip
 import html
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.resources import files
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sec_lab.worlds.katana import Move, Run, Scene
+from sec_lab.worlds.katana import Fault, Move, Run, Scene
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
@@ -82,7 +82,7 @@ class LiveArm:
     @property
     def url(self) -> str:
         """Where the view is, on this machine."""
-        return f"http://{_LOOPBACK}:{self._meshcat.port()}"
+        return _url(self._meshcat)
 
     def move(self, *moves: Move) -> "LiveArm":
         """Let the arm make moves, at the speed of the simulation.
@@ -110,7 +110,68 @@ class LiveArm:
         return f"live 3D view at {self.url}"
 
     def _repr_html_(self) -> str:
-        return f'<iframe src="{self.url}" style="width: 100%; height: {_HEIGHT_PX}px; border: 0"></iframe>'
+        return live_frame(self.url)
+
+
+def live_frame(url: str) -> str:
+    """A live view as part of a page."""
+    return f'<iframe src="{url}" style="width: 100%; height: {_HEIGHT_PX}px; border: 0" title="live 3D view"></iframe>'
+
+
+class ArmFilm:
+    """A run of the arm that can be seen live and is recorded meanwhile.
+
+    Drake ends the process if a viewer is dropped in another thread than it was made in; so it is for programs of one
+    thread.
+
+    Parameters
+    ----------
+    scene : Scene
+    fault : Fault, optional
+        What goes wrong.
+    is_watched : bool, optional
+        Whether the camera films and the live view moves; without it only the recording is made.
+    before_move : callable, optional
+        See :class:`~sec_lab.worlds.katana.Run`.
+
+    Attributes
+    ----------
+    run : Run
+
+    Raises
+    ------
+    UnreachableError
+        If the arm cannot be at the start.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        fault: Fault | None = None,
+        is_watched: bool = True,
+        before_move: Callable[[Move], object] | None = None,
+    ) -> None:
+        self._meshcat = _meshcat()
+        self.run = Run(
+            scene, fault=fault, film=is_watched, watched=is_watched, meshcat=self._meshcat, before_move=before_move
+        )
+        _brighten(self._meshcat)
+        self._meshcat.StartRecording(
+            frames_per_second=_FRAMES_PER_SECOND, set_visualizations_while_recording=is_watched
+        )
+
+    @property
+    def url(self) -> str:
+        """Where the live view is, on this machine."""
+        return _url(self._meshcat)
+
+    def page(self) -> str:
+        """End the recording; a page in which it can be played and scrubbed."""
+        self._meshcat.StopRecording()
+        self._meshcat.PublishRecording()
+        bar = files("sec_lab.viz").joinpath("arm.html").read_text(encoding="utf-8")
+        return str(self._meshcat.StaticHtml()).replace("</body>", f"{bar}</body>")
 
 
 def arm_page(scene: Scene, moves: Sequence[Move]) -> str:
@@ -131,16 +192,10 @@ def arm_page(scene: Scene, moves: Sequence[Move]) -> str:
     UnreachableError
         If a move is out of reach.
     """
-    meshcat = _meshcat()
-    run = Run(scene, film=False, meshcat=meshcat)
-    _brighten(meshcat)
-    meshcat.StartRecording(frames_per_second=_FRAMES_PER_SECOND, set_visualizations_while_recording=False)
+    film = ArmFilm(scene, is_watched=False)
     for move in moves:
-        run.move(move)
-    meshcat.StopRecording()
-    meshcat.PublishRecording()
-    bar = files("sec_lab.viz").joinpath("arm.html").read_text(encoding="utf-8")
-    return str(meshcat.StaticHtml()).replace("</body>", f"{bar}</body>")
+        film.run.move(move)
+    return film.page()
 
 
 def arm_recording(scene: Scene, moves: Sequence[Move], *, title: str) -> ArmRecording:
@@ -159,6 +214,10 @@ def arm_recording(scene: Scene, moves: Sequence[Move], *, title: str) -> ArmReco
         If a move is out of reach.
     """
     return ArmRecording(arm_page(scene, moves), title)
+
+
+def _url(meshcat: "Meshcat") -> str:
+    return f"http://{_LOOPBACK}:{meshcat.port()}"
 
 
 def _meshcat() -> "Meshcat":

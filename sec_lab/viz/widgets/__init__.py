@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from sec_lab.viz.widgets.own_movie import OwnMovie as OwnMovie
     from sec_lab.viz.widgets.own_movie import own_movie as own_movie
     from sec_lab.viz.widgets.picture import ClickablePicture as ClickablePicture
+    from sec_lab.viz.widgets.push import PushExplorer as PushExplorer
+    from sec_lab.viz.widgets.push import push_explorer as push_explorer
     from sec_lab.viz.widgets.segmentation import segmentation_explorer as segmentation_explorer
     from sec_lab.viz.widgets.table import table_explorer as table_explorer
 
@@ -23,10 +25,12 @@ _MODULE_OF = {
     "ChainExplorer": "explorer",
     "ClickablePicture": "picture",
     "OwnMovie": "own_movie",
+    "PushExplorer": "push",
     "chain_explorer": "explorer",
     "learning_explorer": "learning",
     "match_explorer": "match",
     "noise_explorer": "noise",
+    "push_explorer": "push",
     "segmentation_explorer": "segmentation",
     "table_explorer": "table",
     "own_movie": "own_movie",

@@ -30,10 +30,17 @@ class Turn:
         Whether something else was asked for meanwhile.
     report : callable
         Takes how much is done, and of how much.
+    hand_over : callable
+        Takes a function, and calls it where widgets may be changed.
     """
 
-    def __init__(self, is_stale: Callable[[], bool], report: Callable[[int, int], None]) -> None:
-        self._is_stale, self._report = is_stale, report
+    def __init__(
+        self,
+        is_stale: Callable[[], bool],
+        report: Callable[[int, int], None],
+        hand_over: Callable[[Callable[[], None]], None],
+    ) -> None:
+        self._is_stale, self._report, self._hand_over = is_stale, report, hand_over
 
     def report(self, done: int, total: int) -> None:
         """Say how much is done.
@@ -46,6 +53,21 @@ class Turn:
         if self._is_stale():
             raise StaleError
         self._report(done, total)
+
+    def show(self, change: Callable[[], None]) -> None:
+        """Let the widget show something before the work is done, unless something else was asked for meanwhile.
+
+        Parameters
+        ----------
+        change : callable
+            Is called where widgets may be changed.
+        """
+
+        def unless_stale() -> None:
+            if not self._is_stale():
+                change()
+
+        self._hand_over(unless_stale)
 
 
 class _Request(Generic[T]):
@@ -176,7 +198,11 @@ class Latest(Generic[T]):
         self._idle.set()
 
     def _do(self, request: _Request[T]) -> None:
-        turn = Turn(lambda: request.number != self._number, lambda *of: self._report(request, *of))
+        turn = Turn(
+            lambda: request.number != self._number,
+            lambda *of: self._report(request, *of),
+            lambda change: self._hand_over(request, change),
+        )
         try:
             request.result = request.work(turn)
         except StaleError:

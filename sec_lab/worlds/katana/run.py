@@ -1,5 +1,6 @@
 """A scene in motion: the arm makes one move after another while the camera films."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +57,8 @@ class Run:
         Whether somebody takes the frames while it runs, by :meth:`frames_since`.
     meshcat : Meshcat, optional
         Shows and records it.
+    before_move : callable, optional
+        Is told every move before it is made; what it raises ends the run between two moves.
 
     Raises
     ------
@@ -73,6 +76,7 @@ class Run:
         film: bool = True,
         watched: bool = False,
         meshcat: "Meshcat | None" = None,
+        before_move: Callable[[Move], object] | None = None,
     ) -> None:
         from pydrake.systems.analysis import Simulator
 
@@ -113,6 +117,7 @@ class Run:
             if name != other_name
         ]
         self._fault: Fault | None = fault
+        self._before_move = before_move
         self._drawn: tuple[str, Floats] | None = None
         self._wanted: Floats | None = None
         self._offset = np.zeros(3)
@@ -233,6 +238,8 @@ class Run:
         UnreachableError
             Before anything moves.
         """
+        if self._before_move is not None:
+            self._before_move(move)
         fault = self._fault if self._fault is not None and self._fault.move == move.name else None
         offset = self._offset if fault is None else self._offset + self._error(fault)
         # The arm's own errors are those of one visit to the table.
