@@ -25,7 +25,7 @@ _LOOSE_M, _MOST_OFF_M = 0.0003, 0.002
 then, when it was none."""
 _LET_GO_M = 0.0005
 """The same of what was let go beside it, not pressed on."""
-_SPRUNG_M = 0.001
+_SPRUNG_M = 0.0012
 """How much more than while the one was pressed on the other, which makes both give way a little."""
 _MOST_ATTEMPTS = 4
 _SLOWER = 0.5
