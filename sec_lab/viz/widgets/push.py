@@ -128,7 +128,7 @@ class PushExplorer(Explorer):
         self.turn, self.size = _slider("turn (°)", *_TURN_DEG, 1), _slider("size (mm)", *_SIZE_MM, 1)
         hint = "click a thing to choose it, click beside it to move the chosen one there"
         self.table = Drawing(takes_clicks=True, hint=hint)
-        self.camera = ClickablePicture(width=400, description="what the camera sees", tooltip=hint)
+        self.camera = ClickablePicture(width=320, description="what the camera sees", tooltip=hint)
         self.push = widgets.Button(description="push", icon="play", button_style="primary", tooltip="let the arm push")
         self.live = widgets.Checkbox(value=live, description="live 3D view", indent=False, layout={"width": "auto"})
         self.said, self.verdicts, self.view_3d = widgets.HTML(), widgets.HTML(), widgets.HTML(layout={"width": "100%"})
@@ -256,6 +256,9 @@ class PushExplorer(Explorer):
 
         try:
             check_apart(scene)
+            # The picture of what was changed last may not have been asked for yet.
+            seen = self._arm.look(scene)
+            turn.show(lambda: setattr(self.camera, "png", png(seen.image)))
             return self._arm.push(
                 scene, report=turn.report, on_live=on_live,
                 on_verdict=lambda verdict: turn.show(lambda: self._show_verdict(verdict)),
