@@ -62,7 +62,7 @@ def push(
     >>> push(replace(scene, things=scene.things[1:]))
     Traceback (most recent call last):
     ...
-    sec_lab.execution.planning.SceneError: scene: expected something that looks like 'red box', got [...]
+    sec_lab.execution.skill.SceneError: scene: expected something that looks like 'red box', got [...]
     """
     return execute_skill(scene, pushing_skill() if skill is None else skill, fault=fault, run=run, tell=tell)
 
