@@ -17,7 +17,7 @@ PUSH_MS = 180_000
 
 def button(page: Page, name: str) -> Locator:
     # An icon is part of the name, too.
-    return page.locator(".sec-lab-explorer").get_by_role("button", name=re.compile(rf"\b{name}$"))
+    return page.locator(".sec-lab-controls").get_by_role("button", name=re.compile(rf"\b{name}$"))
 
 
 def is_a_picture(shown: Locator) -> bool:
