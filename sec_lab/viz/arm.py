@@ -1,8 +1,5 @@
 """The arm in three dimensions: recordings that play inside a page with all they need in it, and a live view."""
 
-import base64
-import gzip
-import html
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sec_lab.viz.packed_page import packed_frame
 from sec_lab.worlds.katana import Fault, Move, Run, Scene
 
 if TYPE_CHECKING:
@@ -26,12 +24,6 @@ _ARM_COLOUR = (0.07, 0.075, 0.09, 1.0)
 _LINKS = ("base", "pan", "upper_arm", "forearm", "wrist", "roll")
 _HEIGHT_PX = 460
 _LOOPBACK = "127.0.0.1"
-
-_UNPACK = """<!DOCTYPE html><meta charset="utf-8"><title>{title}</title><body><p>Unpacking …</p><script>
-fetch("data:application/gzip;base64,{packed}")
-  .then(answer => new Response(answer.body.pipeThrough(new DecompressionStream("gzip"))).text())
-  .then(page => {{ document.open(); document.write(page); document.close(); }});
-</script></body>"""
 
 
 @dataclass(frozen=True)
@@ -52,13 +44,8 @@ class ArmRecording:
         return f"3D recording: {self.title}"
 
     def _repr_html_(self) -> str:
-        # Packed it is half as large; no date goes into it, so that equal recordings are equal.
-        packed = base64.b64encode(gzip.compress(self.page.encode(), mtime=0)).decode()
-        document = _UNPACK.format(title=html.escape(self.title), packed=packed)
-        return (
-            f'<iframe srcdoc="{html.escape(document)}" title="{html.escape(self.title)}" '
-            f'style="width: 100%; height: {_HEIGHT_PX}px; border: 1px solid #d9dce1" loading="lazy"></iframe>'
-        )
+        style = f"width: 100%; height: {_HEIGHT_PX}px; border: 1px solid #d9dce1"
+        return packed_frame(self.page, title=self.title, style=style)
 
 
 class LiveArm:

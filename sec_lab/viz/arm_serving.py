@@ -15,19 +15,19 @@ from sec_lab.execution.pushing import push, pushing_skill
 from sec_lab.execution.skill import Skill, Step
 from sec_lab.viz.arm import ArmFilm, ArmRecording
 from sec_lab.viz.arm_process import STOP, Pushed
-from sec_lab.worlds.katana import Fault, Move, Scene, view
+from sec_lab.worlds.katana import Fault, Glance, Move, Scene
 
 
 class _StoppedError(Exception):
     """Nobody wants it any more."""
 
 
-def _served(wire: Connection, request: tuple[Any, ...]) -> tuple[Any, ...]:
+def _served(wire: Connection, request: tuple[Any, ...], glance: Glance) -> tuple[Any, ...]:
     """The answer to one request."""
     kind, scene, *more = request
     try:
         if kind == "look":
-            return "answer", view(scene)
+            return "answer", glance.at(scene)
         return "answer", _pushed(wire, scene, *more)
     except _StoppedError:
         return ("stopped",)
@@ -64,13 +64,15 @@ def _pushed(wire: Connection, scene: Scene, fault: Fault | None, skill: Skill | 
 def main() -> None:
     """Serve until the other side ends."""
     wire = Connection(int(sys.argv[1]))
+    glance = Glance()
     with contextlib.suppress(EOFError, ConnectionError):
         while True:
             request = wire.recv()
             if request[0] != STOP:
-                wire.send(_served(wire, request))
-                # Drake's diagrams, and with them the viewer and its server, hang in cycles.
-                gc.collect()
+                wire.send(_served(wire, request, glance))
+                if request[0] != "look":
+                    # Drake's diagrams, and with them the viewer and its server, hang in cycles.
+                    gc.collect()
 
 
 if __name__ == "__main__":

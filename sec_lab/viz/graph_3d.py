@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sec_lab.codes import Relation
 from sec_lab.files import write_whole
 from sec_lab.observation import Observation
+from sec_lab.viz.packed_page import packed_frame
 from sec_lab.viz.style import EDGE_STYLE, RELATION_WORD
 from sec_lab.viz.tint import strong_colour
 
@@ -185,17 +186,22 @@ class Page3D:
     Attributes
     ----------
     html : str
-        The whole page, about 1 MB.
+        The whole page, about 1 MB; in a notebook it is packed to a third of that.
+    title : str
     height_px : int
         In a notebook.
     """
 
     html: str
+    title: str = "scene graph"
     height_px: int = 420
 
+    def __repr__(self) -> str:
+        return f"3D view: {self.title}"
+
     def _repr_html_(self) -> str:
-        source = html.escape(self.html, quote=True)
-        return f'<iframe srcdoc="{source}" style="width:100%;height:{self.height_px}px;border:0" title="3D"></iframe>'
+        style = f"width: 100%; height: {self.height_px}px; border: 0"
+        return packed_frame(self.html, title=self.title, style=style)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the page into a file, whole or not at all."""
@@ -252,7 +258,7 @@ def draw_graph_3d(
         if (scene.relations == relation).any():
             said += f'<span><b style="background:{EDGE_STYLE[relation].colour}"></b>{RELATION_WORD[relation]}</span>'
     page = _PAGE.replace("TITLE", html.escape(title)).replace("LEGEND", said)
-    return Page3D(page.replace("VIEWER", _viewer()).replace("COMMANDS", commands), height_px)
+    return Page3D(page.replace("VIEWER", _viewer()).replace("COMMANDS", commands), title, height_px)
 
 
 class Record:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import nbformat
 import pytest
@@ -72,6 +73,28 @@ class Lab:
         notebook.metadata["language_info"] = {"name": "python"}
         name = f"page_{len(self.pages)}.ipynb"
         nbformat.write(notebook, self.folder / name)
+        page = self._page_of(name, front=front, width=width, height=height)
+        if dark:
+            page.evaluate("() => void jupyterapp.commands.execute('apputils:change-theme', {theme: 'JupyterLab Dark'})")
+            page.wait_for_selector("body[data-jp-theme-light=false]", state="attached", timeout=RUN_MS)
+        page.evaluate("() => void jupyterapp.commands.execute('notebook:run-all-cells')")
+        last = page.locator(".jp-CodeCell .jp-InputPrompt").nth(len(sources) - 1)
+        deadline = time.monotonic() + RUN_MS / 1000
+        while not re.search(r"\[\d+\]", last.inner_text()):
+            if time.monotonic() > deadline:
+                page.screenshot(path=SCREENS / "not_executed.png")
+                pytest.fail("the cells are not executed: see build/screens/not_executed.png")
+            page.wait_for_timeout(50)
+        errors = page.locator(".jp-OutputArea-output[data-mime-type='application/vnd.jupyter.stderr']")
+        assert not errors.count(), errors.first.inner_text()
+        return page
+
+    def beside(self, page: Page, *, front: str, width: int = 1300, height: int = 1000) -> Page:
+        """The notebook of a page in a second page, with the same kernel; it must have been saved."""
+        return self._page_of(Path(urlsplit(page.url).path).name, front=front, width=width, height=height)
+
+    def _page_of(self, name: str, *, front: str, width: int, height: int) -> Page:
+        """Open a notebook of the folder, and wait until its kernel is there."""
         page = self.browser.new_page(viewport={"width": width, "height": height})
         said: list[str] = []
         self.pages.append((page, said))
@@ -87,19 +110,6 @@ class Lab:
         page.goto(f"{self.address}/{where}/{name}?token={self.token}")
         page.wait_for_selector(".jp-Notebook .jp-CodeCell .cm-content", timeout=RUN_MS)
         page.wait_for_function(IS_READY, timeout=RUN_MS)
-        if dark:
-            page.evaluate("() => void jupyterapp.commands.execute('apputils:change-theme', {theme: 'JupyterLab Dark'})")
-            page.wait_for_selector("body[data-jp-theme-light=false]", state="attached", timeout=RUN_MS)
-        page.evaluate("() => void jupyterapp.commands.execute('notebook:run-all-cells')")
-        last = page.locator(".jp-CodeCell .jp-InputPrompt").nth(len(sources) - 1)
-        deadline = time.monotonic() + RUN_MS / 1000
-        while not re.search(r"\[\d+\]", last.inner_text()):
-            if time.monotonic() > deadline:
-                page.screenshot(path=SCREENS / "not_executed.png")
-                pytest.fail("the cells are not executed: see build/screens/not_executed.png")
-            page.wait_for_timeout(50)
-        errors = page.locator(".jp-OutputArea-output[data-mime-type='application/vnd.jupyter.stderr']")
-        assert not errors.count(), errors.first.inner_text()
         return page
 
     def execute(self, page: Page, source: str) -> None:

@@ -4,10 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
 from sec_lab.report import build_report
+from sec_lab.worlds.drawn import moving_object
 from tests.browser.conftest import ROOT
 from tests.browser.test_chain_explorer import MOVIE
 
@@ -48,6 +50,24 @@ def test_explorers_scrub_on_a_page_without_network(
     scrubber.locator("tbody tr").nth(3).locator("td").nth(1).click()
     assert output.inner_text() == "frame 27 · column 2 of 5"
     assert scrubber.locator("tr.chosen th").inner_text() == "black round object, yellow vessel"
+    # Its two segments stand out in the picture and in the graph, where they are in this frame.
+    outlines = scrubber.locator("svg.outlines g").first.locator("path")
+    assert scrubber.locator("svg.outlines g").count() == 2
+    assert [outlines.nth(i).get_attribute("data-segment") for i in range(outlines.count())] == ["4", "4", "2", "2"]
+    labels = np.asarray(moving_object(1).labels)[27]
+    screenshot(scrubber.locator(".view"), "report_scrubber_row")
+    for place, label in ((0, 4), (2, 2)):
+        box = outlines.nth(place).evaluate(
+            "node => { const b = node.getBBox(); return [b.x, b.y, b.width, b.height]; }"
+        )
+        rows, columns = np.nonzero(labels == label)
+        scale = 1 if labels.shape[1] > 320 else -(-256 // labels.shape[0])
+        assert np.allclose(np.array(box) / scale, [columns.min(), rows.min(), np.ptp(columns), np.ptp(rows)], atol=1.5)
+    last = outlines.first.get_attribute("d")
+    scrubber.locator("input[type=range]").fill("50")
+    assert outlines.first.get_attribute("d") != last
+    scrubber.locator("tbody tr").nth(3).locator("th").click()
+    assert outlines.count() == 0
     scrubber.focus()
     for key, words in (
         ("End", "frame 91 ·"),

@@ -1,11 +1,14 @@
 """The arm and its table: closed form against Drake, tracking, contact, faults, scenes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sec_lab.worlds.katana import (
     Camera,
     Fault,
+    Glance,
     Move,
     Run,
     Scene,
@@ -259,3 +262,16 @@ def test_scenes_are_as_promised() -> None:
 def test_bad_input_gets_one_clear_error(make, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_a_glance_at_a_changed_scene_sees_what_a_new_run_would_see() -> None:
+    glance, first = Glance(), example_scene("a")
+    for scene in (
+        first,
+        replace(first, things=(replace(first.things[0], p_W_m=(0.3, 0.05, 0.03), yaw_rad=0.4), *first.things[1:])),
+        replace(first, camera=camera_at(azimuth_deg=20, elevation_deg=55)),
+        example_scene("f"),
+    ):
+        seen, built = glance.at(scene), Run(replace(scene, start_m=scene.home_m)).view()
+        assert np.array_equal(seen.image, built.image)
+        assert np.array_equal(seen.depth_m, built.depth_m)

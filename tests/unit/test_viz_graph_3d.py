@@ -1,5 +1,7 @@
 """Scene graphs in three dimensions: what stands in the page is where the segments are, when they are there."""
 
+import base64
+import gzip
 import html
 import re
 import socket
@@ -157,8 +159,6 @@ def test_positions_in_the_picture_stand_upright() -> None:
 
 
 def commands_of(page: str) -> list[bytes]:
-    import base64
-
     return [base64.b64decode(data) for data in re.findall(r"octet-binary;base64,([^\"]+)\"", page)]
 
 
@@ -175,7 +175,12 @@ def test_the_page_holds_all_commands_needs_no_network_and_is_the_same_every_time
     shown = page._repr_html_()
     source = re.search(r'srcdoc="([^"]*)"', shown)
     assert source is not None
-    assert html.unescape(source[1]) == page.html
+    packed = re.search(r"base64,([^\"]+)", html.unescape(source[1]))
+    assert packed is not None
+    assert gzip.decompress(base64.b64decode(packed[1])).decode() == page.html
+    # What a notebook stores of it.
+    assert len(shown) < 0.45 * len(page.html)
+    assert repr(page) == "3D view: a <cup>"
 
 
 def test_the_live_view_listens_on_loopback_only_and_ends() -> None:

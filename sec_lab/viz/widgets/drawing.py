@@ -6,6 +6,8 @@ from typing import Any
 import anywidget
 import traitlets
 
+from sec_lab.viz.widgets.keys import ARROWS
+
 # Shortcuts of JupyterLab and Notebook are off while the drawing has the focus; Tab and keys with Ctrl pass through.
 _SCRIPT = """
 function render({ model, el }) {
@@ -93,7 +95,7 @@ class Drawing(anywidget.AnyWidget):
     [(12.5, 7.0)]
     """
 
-    _esm = _SCRIPT
+    _esm = ARROWS + _SCRIPT
     _css = _STYLE
 
     svg = traitlets.Unicode("").tag(sync=True)

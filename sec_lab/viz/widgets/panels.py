@@ -16,6 +16,7 @@ from sec_lab.viz.widgets.seen import KeptFrame, Labels
 
 _LEAST_HIGH, _MOST_WIDE, _GAP = 256, 640, 6
 _JPEG_QUALITY = 88
+_OUTLINE_PX = 1.0
 _DIMMED = 0.4
 
 
@@ -125,6 +126,27 @@ class FramePanels:
             return None
         height, width = labels.shape
         return int(labels[row * height // self._high, column * width // self._wide])
+
+    @property
+    def lefts(self) -> list[int]:
+        """Left edges of the panels in which segments stand out, in pixels of the picture."""
+        return [place * (self._wide + _GAP) for place, kind in enumerate(self._kinds) if kind != "depth"]
+
+    def outlines(self, frame: KeptFrame | None) -> dict[int, str]:
+        """Borders of the segments of a frame as paths of SVG, in pixels of the first panel; whole to a pixel or so."""
+        import cv2
+
+        labels = self.labels_of(frame)
+        if labels is None:
+            return {}
+        shown, found = self._enlarged_labels(labels), {}
+        for label in np.unique(shown).tolist():
+            borders, _ = cv2.findContours((shown == label).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+            coarse = [cv2.approxPolyDP(border, _OUTLINE_PX, closed=True)[:, 0] for border in borders]
+            found[label] = "".join(
+                "M" + "L".join(f"{x} {y}" for x, y in border.tolist()) + "Z" for border in coarse if len(border) > 2
+            )
+        return found
 
     def _panel(self, kind: str, frame: KeptFrame | None, labels: Labels | None) -> NDArray[np.uint8]:
         if kind == "depth":

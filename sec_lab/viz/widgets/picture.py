@@ -5,6 +5,8 @@ from collections.abc import Callable
 import anywidget
 import traitlets
 
+from sec_lab.viz.widgets.keys import ARROWS
+
 # The picture is decoded beside the page and drawn at once, so there is no flicker, and nothing of it is kept.
 # Shortcuts of JupyterLab and Notebook are off while the picture has the focus; Tab and keys with Ctrl pass through.
 _SCRIPT = """
@@ -136,7 +138,7 @@ class ClickablePicture(anywidget.AnyWidget):
     [(12, 7)]
     """
 
-    _esm = _SCRIPT
+    _esm = ARROWS + _SCRIPT
     _css = _STYLE
 
     png = traitlets.Bytes(b"").tag(sync=True)

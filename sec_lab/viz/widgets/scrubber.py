@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab.viz.style import RELATION_WORD
+from sec_lab.viz.tint import strong_colour
 from sec_lab.viz.widgets.book import ChainBook
 from sec_lab.viz.widgets.panels import jpeg_bytes
 
@@ -59,11 +60,12 @@ def scrubber_html(book: ChainBook, *, most_bytes: int = MOST_BYTES) -> str:
     book.row = None
     book.choose([])
     places, pictures = _within(book, most_bytes)
-    told, columns = [], []
+    told, columns, outlines = [], [], []
     for place in places:
         book.go_to(place)
         told.append(book.told)
         columns.append(book.column)
+        outlines.append(book.panels.outlines(book.frame))
     book.place, book.row = at[0], at[1]
     book.choose(at[2])
     recorded = book.observation.recorded
@@ -74,18 +76,23 @@ def scrubber_html(book: ChainBook, *, most_bytes: int = MOST_BYTES) -> str:
     template = environment.from_string(
         files("sec_lab.viz.widgets").joinpath("scrubber.html").read_text(encoding="utf-8")
     )
-    n_frames = len(book.numbers)
+    n_frames, segments = len(book.numbers), book.observation.segments.tolist()
     return template.render(
         key=f"scrubber-{hashlib.sha256(''.join(pictures).encode()).hexdigest()[:12]}",
         pictures=pictures,
-        width=book.panels.draw(book.frame, column=book.column).shape[1],
+        size=book.panels.draw(book.frame, column=book.column).shape[1::-1],
+        lefts=book.panels.lefts,
         key_frames=recorded.key_frames.tolist(),
         rows=[] if chain is None else [
-            {"name": chain.row_label(row), "codes": chain.relations[row].tolist()} for row in rows
+            {"name": chain.row_label(row), "codes": chain.relations[row].tolist(), "pair": chain.pairs[row].tolist()}
+            for row in rows
         ],
         words=[(int(relation), word) for relation, word in RELATION_WORD.items()],
         said="" if len(places) == n_frames else f"{len(places)} of {n_frames} frames are on this page.",
-        data={"pictures": pictures, "told": told, "columns": columns, "first": first},
+        data={
+            "pictures": pictures, "told": told, "columns": columns, "first": first, "outlines": outlines,
+            "colours": {label: "#{:02x}{:02x}{:02x}".format(*strong_colour(label)) for label in segments},
+        },
     )  # fmt: skip
 
 

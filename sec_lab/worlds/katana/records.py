@@ -73,6 +73,25 @@ class Thing:
         object.__setattr__(self, "yaw_rad", float(self.yaw_rad))
 
 
+def pose_of(thing: Thing) -> Floats:
+    """Pose of a thing in the world, (4, 4) float64.
+
+    Parameters
+    ----------
+    thing : Thing
+
+    Examples
+    --------
+    >>> pose_of(Thing("ball", "sphere", (200, 20, 20), (0.06, 0.06, 0.06), (0.3, 0.0, 0.03)))[:3, 3].tolist()
+    [0.3, 0.0, 0.03]
+    """
+    pose = np.eye(4)
+    cosine, sine = np.cos(thing.yaw_rad), np.sin(thing.yaw_rad)
+    pose[:2, :2] = (cosine, -sine), (sine, cosine)
+    pose[:3, 3] = thing.p_W_m
+    return pose
+
+
 @dataclass(frozen=True, eq=False)
 class Camera:
     """A camera with a range finder; pixel centres have whole coordinates, the axis meets the middle of the picture.

@@ -13,7 +13,7 @@ from sec_lab.worlds.katana.film import Film
 from sec_lab.worlds.katana.inverse import solved_joint_angles
 from sec_lab.worlds.katana.kinematics import UnreachableError, hand_axes, joint_angles, tip_position
 from sec_lab.worlds.katana.paths import FINGER_RAD, LOW_M, Path, path_of
-from sec_lab.worlds.katana.records import ARM, TABLE, Fault, Floats, Gripper, Move, Scene, Thing, Truth, View
+from sec_lab.worlds.katana.records import ARM, TABLE, Fault, Floats, Gripper, Move, Scene, Truth, View, pose_of
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
@@ -93,7 +93,7 @@ class Run:
         self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
         self._katana = plant.GetModelInstanceByName("katana")
         for thing in scene.things:
-            self._place(thing.name, _pose(thing))
+            self._place(thing.name, pose_of(thing))
         q: Any = self._q
         plant.SetPositions(self._plant_context, self._katana, q)
         # Until the gripper is told to move, each finger is held where it is: by what holds it, not by the gear.
@@ -411,29 +411,6 @@ class Run:
         self._bench.plant.SetFreeBodyPose(self._plant_context, body, RigidTransform(X_WB))
         nothing: Any = np.zeros(6)
         self._bench.plant.SetFreeBodySpatialVelocity(self._plant_context, body, SpatialVelocity(nothing))
-
-
-def view(scene: Scene) -> View:
-    """What the camera of a scene sees with the arm at home.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Raises
-    ------
-    UnreachableError
-        If the arm cannot be at home.
-    """
-    return Run(replace(scene, start_m=scene.home_m)).view()
-
-
-def _pose(thing: Thing) -> Floats:
-    pose = np.eye(4)
-    cosine, sine = np.cos(thing.yaw_rad), np.sin(thing.yaw_rad)
-    pose[:2, :2] = (cosine, -sine), (sine, cosine)
-    pose[:3, 3] = thing.p_W_m
-    return pose
 
 
 def _owners(bench: Bench) -> dict[Any, str]:
