@@ -27,5 +27,9 @@ def _report(options: argparse.Namespace) -> int:
     summary = build_report(options.notebooks or None, root=Path.cwd(), force=options.force)
     for line in summary.errors:
         say(line, file=sys.stderr)
+    for page in summary.pages:
+        if page.explorer_bytes:
+            sizes = ", ".join(f"{size / 1e6:.2f}" for size in page.explorer_bytes)
+            say(f"{page.page.name}: explorers of {sizes} MB (at most 5 each)")
     say(str(summary.index))
     return 1 if summary.errors else 0

@@ -22,7 +22,9 @@ from sec_lab.files import write_whole
 from sec_lab.report.execution import NotebookFailure, code_cells, execute, read_notebook
 from sec_lab.report.pages import (
     FOR_PAGES,
+    MOST_EXPLORER_BYTES,
     NotebookSummary,
+    explorer_bytes,
     network_loads,
     notebook_html,
     sections_of,
@@ -49,12 +51,15 @@ class ReportPage:
         outputs because the recordings are not here; failed; never executed and not asked for.
     error : str
         One line that names the notebook, the cell and the error; empty if nothing failed.
+    explorer_bytes : tuple of int
+        Sizes of its explorers that scrub; each is below 5 MB, or the page is not written.
     """
 
     notebook: Path
     page: Path
     status: Status
     error: str = ""
+    explorer_bytes: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,13 @@ def build_report(
             entries[entries.index(entry)] = _executed(entry, copies, on_cell=bar.update)
 
     entries = list(_write_pages(entries, output))
-    pages = tuple(ReportPage(entry.path, output / entry.name, entry.status, entry.error) for entry in entries)
+    pages = tuple(
+        ReportPage(
+            entry.path, output / entry.name, entry.status, entry.error,
+            () if entry.shown is None else explorer_bytes(entry.shown),
+        )
+        for entry in entries
+    )  # fmt: skip
     cards = [{"entry": entry, "summary": entry.summary} for entry in entries]
     write_whole(output / "index.html", template().render(cards=cards))
     return ReportSummary(output / "index.html", pages)
@@ -239,8 +250,12 @@ def _write_pages(entries: Sequence[_Entry], output: Path) -> Iterator[_Entry]:
             before=present[place - 1] if place else None,
             after=present[place + 1] if place + 1 < len(present) else None,
         )
-        loads = network_loads(page)
-        if loads:
+        loads, largest = network_loads(page), max(explorer_bytes(entry.shown), default=0)
+        if largest > MOST_EXPLORER_BYTES:
+            most = f"{MOST_EXPLORER_BYTES / 1e6:.0f} MB"
+            problem = f"{entry.path.name}: expected explorers of at most {most} each, got {largest / 1e6:.1f} MB"
+            yield replace(entry, status="failed", error=entry.error or problem)
+        elif loads:
             problem = f"{entry.path.name}: expected a page that stands alone, but it would load {loads[0]}"
             yield replace(entry, status="failed", error=entry.error or problem)
         else:

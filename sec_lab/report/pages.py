@@ -21,6 +21,8 @@ from nbformat import NotebookNode
 
 # As of sec_lab.viz.widgets.scrubber, which is imported by the kernels that show widgets only.
 FOR_PAGES, SCRUBBER = "SEC_LAB_FOR_PAGES", "application/vnd.sec-lab.scrubber+html"
+MOST_EXPLORER_BYTES = 5_000_000
+"""Of one explorer that scrubs; a page may have several."""
 _WIDGET = "application/vnd.jupyter.widget-view+json"
 _PICTURES = ("image/png", "image/jpeg", "image/svg+xml")
 _WIDGET_NOTE = (
@@ -121,6 +123,18 @@ def _first_picture(notebook: NotebookNode) -> str:
                 if kind in output.get("data", {}):
                     return f"data:{kind};base64,{''.join(output.data[kind].split())}"
     return ""
+
+
+def explorer_bytes(notebook: NotebookNode) -> tuple[int, ...]:
+    """Sizes of the explorers that scrub in the page of an executed notebook, in their order.
+
+    Examples
+    --------
+    >>> explorer_bytes(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("1")]))
+    ()
+    """
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    return tuple(len(output.data[SCRUBBER].encode()) for output in outputs if SCRUBBER in output.get("data", {}))
 
 
 def notebook_html(notebook: NotebookNode, *, source: Path, folder: Path, pages: dict[Path, str]) -> str:

@@ -28,6 +28,15 @@ IS_READY = """() => {
   const context = globalThis.jupyterapp?.shell.currentWidget?.sessionContext;
   return context?.isReady && context.session?.kernel?.status === "idle";
 }"""
+RUN_CELL = """async (place) => {
+  const notebook = jupyterapp.shell.currentWidget.content;
+  notebook.deselectAll();
+  notebook.activeCellIndex = place;
+  await jupyterapp.commands.execute("notebook:run-cell");
+  const outputs = notebook.model.cells.get(place).outputs.toJSON();
+  const error = outputs.find((one) => one.output_type === "error");
+  if (error) throw new Error(`cell ${place}: ${error.ename}: ${error.evalue}`);
+}"""
 EXECUTABLE = os.environ.get("SEC_LAB_CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 # JupyterLab complains about itself; what counts is what concerns widgets.
 OURS = re.compile(r"widget|sec-lab|createImageBitmap", re.IGNORECASE)
@@ -87,6 +96,16 @@ class Lab:
             page.wait_for_timeout(50)
         errors = page.locator(".jp-OutputArea-output[data-mime-type='application/vnd.jupyter.stderr']")
         assert not errors.count(), errors.first.inner_text()
+        return page
+
+    def open_stored(self, path: Path, places: list[int], *, width: int = 1300, height: int = 1000) -> Page:
+        """Open a copy of a notebook with its stored outputs, and execute some of its cells, one after the other."""
+        name = f"page_{len(self.pages)}_{path.name}"
+        shutil.copyfile(path, self.folder / name)
+        page = self._page_of(name, front="lab", width=width, height=height)
+        self.execute(page, f"import os; os.chdir({str(path.parent)!r})")
+        for place in places:
+            page.evaluate(RUN_CELL, place)
         return page
 
     def beside(self, page: Page, *, front: str, width: int = 1300, height: int = 1000) -> Page:

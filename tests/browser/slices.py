@@ -18,15 +18,20 @@ def widget_cells(notebook: NotebookNode) -> list[int]:
     ]
 
 
-def needed_cells(notebook: NotebookNode, place: int) -> list[str]:
-    """Sources of the cells that bind what a cell uses, directly or not, in their order, and of the cell itself."""
-    wanted = _used(notebook.cells[place].source)
-    sources = [notebook.cells[place].source]
-    for cell in reversed(notebook.cells[:place]):
-        if cell.cell_type == "code" and _bound(cell.source) & wanted:
-            sources.insert(0, cell.source)
+def needed_places(notebook: NotebookNode, places: list[int]) -> list[int]:
+    """Indices of some cells and of those that bind what they use, directly or not, in their order."""
+    chosen, wanted = set(places), set[str]()
+    for place in range(max(places), -1, -1):
+        cell = notebook.cells[place]
+        if cell.cell_type == "code" and (place in chosen or _bound(cell.source) & wanted):
+            chosen.add(place)
             wanted |= _used(cell.source)
-    return sources
+    return sorted(chosen)
+
+
+def needed_cells(notebook: NotebookNode, place: int) -> list[str]:
+    """Sources of the cells that one cell needs, and of itself."""
+    return [notebook.cells[needed].source for needed in needed_places(notebook, [place])]
 
 
 def _names(source: str, context: type[ast.expr_context]) -> set[str]:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 from playwright.sync_api import Locator, Page
 
 from tests.browser.conftest import Lab
@@ -18,7 +17,6 @@ one = moving_object(1)
 seen = sl.observe_segments(sl.Segmentation.from_labels(one.labels, names=one.names), relations="edge counting")
 chain_explorer(seen, recording=one.frames)
 """
-N_MOVES = 80
 # Filmed, with depth, so that no two frames are the same picture.
 FILMED = """
 import os
@@ -120,6 +118,8 @@ def test_every_control_does_what_it_says(lab: Lab, screenshot: Callable[..., Pat
     page.keyboard.press(" ")
     says(page, "column 2 of 5")
     page.keyboard.press(" ")
+    # Only then no frame is under way any more.
+    page.locator(".widget-play .fa-play").wait_for()
 
     # A segment is chosen in the picture, and named.
     page.keyboard.press("Home")
@@ -159,58 +159,3 @@ def chain_column(chain: Locator, column: int) -> int:
     widths = chain.evaluate("canvas => canvas.width")
     assert isinstance(widths, int)
     return widths - 12 - 68 * (5 - column) - 34
-
-
-STOPWATCH = """
-(canvas) => {
-  globalThis.times = [];
-  document.addEventListener("pointermove", () => { globalThis.moved = performance.now(); }, true);
-  canvas.addEventListener("drawn", () => {
-    requestAnimationFrame(() => globalThis.times.push(performance.now() - globalThis.moved));
-  });
-}
-"""
-
-
-def test_how_long_a_picture_takes_to_follow_the_slider(
-    lab: Lab, capsys: pytest.CaptureFixture[str], screenshot: Callable[..., Path]
-) -> None:
-    page = lab.open(FILMED)
-    says(page, "frame 0 · 0.00 s")
-    box = page.locator(".sec-lab-explorer .widget-slider .noUi-base").bounding_box()
-    assert box is not None
-    page.get_by_role("img", name="frame with").evaluate(STOPWATCH)
-    middle = box["y"] + box["height"] / 2
-    page.mouse.move(box["x"], middle)
-    page.mouse.down()
-    # From frame to frame, each when the one before is there.
-    for move in range(1, N_MOVES + 1):
-        page.mouse.move(box["x"] + box["width"] * move / 135, middle)
-        page.wait_for_function("n => globalThis.times.length >= n", arg=move)
-    page.mouse.up()
-    says(page, f"frame {N_MOVES} ·")
-    times = page.evaluate("globalThis.times")
-    page.get_by_role("img", name="event chain").focus()
-    page.keyboard.press("ArrowUp")
-    page.locator(".sec-lab-explorer .widget-label", has_text="plate, ").wait_for()
-    page.get_by_role("img", name="frame with").blur()
-    screenshot(page.locator(".sec-lab-explorer"), "chain_explorer_filmed")
-    assert len(times) == N_MOVES
-    median, late = np.percentile(times, (50, 95))
-    with capsys.disabled():
-        print(f"\nslider to picture, 320×256: median {median:.0f} ms, 95th percentile {late:.0f} ms of {N_MOVES} moves")
-
-
-def test_dark_theme_in_lab_and_in_notebook(lab: Lab, screenshot: Callable[..., Path]) -> None:
-    page = lab.open(MOVIE, dark=True)
-    chain = page.get_by_role("img", name="event chain")
-    says(page, "frame 0 ·")
-    page.wait_for_function("c => Number(c.dataset.drawn) > 1", arg=chain.element_handle())
-    assert max(chain.evaluate(PIXEL, [3, 100])) < 60
-    screenshot(page, "chain_explorer_dark")
-    page = lab.open(MOVIE, front="notebook")
-    says(page, "frame 0 ·")
-    page.get_by_role("img", name="frame with").focus()
-    page.keyboard.press("End")
-    says(page, "frame 91 ·")
-    screenshot(page, "chain_explorer_notebook7")

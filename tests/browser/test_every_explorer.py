@@ -10,8 +10,8 @@ import pytest
 from playwright.sync_api import Locator, Page
 
 from tests.browser.conftest import SCREENS, Lab
-from tests.browser.test_chain_explorer import FILMED
-from tests.browser.test_explorers import CHAINS, SCENE
+from tests.browser.test_chain_explorer import FILMED, PIXEL
+from tests.browser.test_explorers import CHAINS
 
 N_MOVES = 30
 
@@ -44,8 +44,8 @@ EXPLORERS: dict[str, tuple[str, tuple[Move, ...]]] = {
     ),
     "noise": ("widgets.noise_explorer(p=0.2, n_samples=100)", (Move("noise level p", "sample ", ENDS),)),
     "segmentation": (
-        "widgets.segmentation_explorer(frames, truth)",
-        (Move("frame", SEGMENTS, TO_AND_FRO), Move("α", SEGMENTS, ENDS)),
+        "widgets.segmentation_explorer(movie, true.labels)",
+        (Move("frame", SEGMENTS, RIGHT), Move("α", SEGMENTS, ENDS)),
     ),
     "push": (
         "widgets.push_explorer()",
@@ -102,7 +102,7 @@ def latencies_ms(page: Page, shown: Locator, move: Move, n_moves: int) -> list[f
 def test_pictures_follow_in_lab_and_in_notebook(
     lab: Lab, capsys: pytest.CaptureFixture[str], screenshot: Callable[..., Path]
 ) -> None:
-    page = lab.open(CHAINS + SCENE, *(source for source, _ in EXPLORERS.values()), dark=True, height=1400)
+    page = lab.open(CHAINS, *(source for source, _ in EXPLORERS.values()), dark=True, height=1400)
     page.evaluate("document.addEventListener('keydown', () => globalThis.begin?.(), true)")
     table = [f"{'explorer':13} {'slider':17} {'picture':29} moves  median ms  95th percentile ms"]
     for place, (name, (_, moves)) in enumerate(EXPLORERS.items(), start=1):
@@ -120,6 +120,8 @@ def test_pictures_follow_in_lab_and_in_notebook(
                 f"{name:13} {told[0]:17} {(told[1] or move.picture)[:29]:29} {N_MOVES:5} {median:10.0f} {late:19.0f}"
             )
         screenshot(shown, f"{name}_dark")
+    chain = page.get_by_role("img", name="event chain")
+    assert max(chain.evaluate(PIXEL, [3, 100])) < 60
     SCREENS.mkdir(parents=True, exist_ok=True)
     (SCREENS / "latency.txt").write_text("\n".join(table) + "\n", encoding="utf-8")
     with capsys.disabled():
@@ -128,6 +130,8 @@ def test_pictures_follow_in_lab_and_in_notebook(
     # The same kernel, seen from Notebook 7 in its light theme: everything is there, and still moves.
     page.evaluate("() => jupyterapp.commands.execute('docmanager:save')")
     page = lab.beside(page, front="notebook", height=1400)
+    page.evaluate("() => jupyterapp.commands.execute('apputils:change-theme', {theme: 'JupyterLab Light'})")
+    page.wait_for_selector("body[data-jp-theme-light=true]", state="attached")
     page.evaluate("document.addEventListener('keydown', () => globalThis.begin?.(), true)")
     for place, (name, (_, moves)) in enumerate(EXPLORERS.items(), start=1):
         shown = page.locator(".jp-CodeCell").nth(place)
@@ -135,3 +139,8 @@ def test_pictures_follow_in_lab_and_in_notebook(
         picture(shown, moves[0].picture).wait_for()
         assert latencies_ms(page, shown, moves[0], 2)
         screenshot(shown, f"{name}_notebook7")
+        if name == "chain":
+            assert min(shown.get_by_role("img", name="event chain").evaluate(PIXEL, [3, 100])) > 200
+            page.get_by_role("img", name="event chain").press("ArrowUp")
+            page.locator(".sec-lab-explorer .widget-label", has_text="plate, ").wait_for()
+            screenshot(shown.locator(".sec-lab-explorer"), "chain_explorer_filmed")

@@ -1,7 +1,6 @@
 """Every explorer in JupyterLab: all controls are moved, and the page shows what they changed."""
 
 import re
-import statistics
 from collections.abc import Callable
 from pathlib import Path
 
@@ -46,7 +45,6 @@ for control in vars(explorer).values():
         control.observe(lambda _: setattr(told, "value", repr(explorer.parameters)), "value")
 ipywidgets.VBox([explorer, told])
 """
-MOVES = 20
 
 
 def slider(page: Page, label: str) -> Locator:
@@ -102,26 +100,6 @@ def host(page: Page, label: str) -> Locator:
     return page.locator(".sec-lab-drawing").filter(has=drawing(page, label))
 
 
-def latency_ms(page: Page, label: str, shown: Locator, what: str) -> list[float]:
-    """From keys on a slider to what the page then shows, as the page measures it."""
-    slider(page, label).locator(".noUi-handle").focus()
-    shown.evaluate("""(node) => {
-      globalThis.moved = [];
-      let begin = null;
-      document.addEventListener("keydown", () => { begin = performance.now(); }, true);
-      const seen = () => { if (begin !== null) { globalThis.moved.push(performance.now() - begin); begin = null; } };
-      if (node.tagName === "CANVAS") node.addEventListener("drawn", seen);
-      else new MutationObserver(seen).observe(node, { childList: true });
-    }""")
-    for i in range(MOVES):
-        page.keyboard.press("ArrowRight" if i // 3 % 2 == 0 else "ArrowLeft")
-        page.wait_for_function(f"() => globalThis.moved.length > {i}")
-    took: list[float] = page.evaluate("() => globalThis.moved")
-    most = statistics.quantiles(took, n=20)[-1]
-    print(f"{what}: a move is seen after {statistics.median(took):.0f} ms (median), {most:.0f} ms (95th percentile)")
-    return took
-
-
 def says(page: Page, text: str | re.Pattern[str]) -> None:
     expect(page.locator(".widget-html-content").filter(has_text=text).first).to_be_visible()
 
@@ -151,9 +129,7 @@ def test_table_explorer(lab: Lab, screenshot: Callable[..., Path]) -> None:
     page.wait_for_selector("body[data-jp-theme-light=false]", state="attached")
     table = host(page, "similarities of all pairs")
     says(page, re.compile(r"threshold 64 %: \d+ of 15 pairs are similar; \d+ false negative"))
-    # The upright line of the curves is elsewhere after every move.
-    assert len(latency_ms(page, "threshold", host(page, "pairs decided wrongly"), "table")) == MOVES
-    page.keyboard.press("End")
+    slider(page, "threshold").locator(".noUi-handle").press("End")
     says(page, "threshold 100 %: 0 of 15 pairs are similar; 6 false negatives (of 6 pairs of one class)")
     expect(table.locator("[data-decision='false negative']")).to_have_count(12)
     expect(host(page, "pairs decided wrongly").locator("[data-marker='100']")).to_have_count(1)
@@ -212,7 +188,7 @@ def test_noise_explorer(lab: Lab, screenshot: Callable[..., Path]) -> None:
     screenshot(page, "noise_explorer")
 
 
-def test_segmentation_explorer_and_how_fast_its_picture_follows(lab: Lab, screenshot: Callable[..., Path]) -> None:
+def test_segmentation_explorer(lab: Lab, screenshot: Callable[..., Path]) -> None:
     page = lab.open(SCENE, EXPLORER, height=1200)
     says(page, "frame 0: 3 segments; 3 true ones are covered by 1.000")
     for label, name, value in (
@@ -236,8 +212,6 @@ def test_segmentation_explorer_and_how_fast_its_picture_follows(lab: Lab, screen
     picture.click(position={"x": 5, "y": 5})
     says(page, re.compile(r"column 5 px, row 5 px: segment 1, 67920 px \(82.9 %\)"))
     screenshot(page, "segmentation_explorer")
-    # Frames differ, so every move shows another picture.
-    assert len(latency_ms(page, "frame", picture, "segmentation of 320×256 pixels")) == MOVES
 
 
 def test_bad_input_is_a_sentence_and_the_notebook_lives_on(lab: Lab) -> None:

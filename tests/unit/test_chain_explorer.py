@@ -354,7 +354,7 @@ def test_the_report_is_given_what_scrubs(seen: Seen, monkeypatch: pytest.MonkeyP
     assert SCRUBBER not in explorer._repr_mimebundle_()
     monkeypatch.setenv(FOR_PAGES, "1")
     page = explorer._repr_mimebundle_()[SCRUBBER]
-    assert page.count("data:image/jpeg") == 12 + 1
+    assert page.count("data:image/webp") == 12 + 1
     assert pages.network_loads(page) == []
     assert explorer.book is not None
     assert explorer.book.place == 0

@@ -12,7 +12,7 @@ import nbformat
 import pytest
 from nbformat import NotebookNode
 
-from sec_lab.report import ReportSummary, build, build_report
+from sec_lab.report import ReportSummary, build, build_report, pages
 from sec_lab.report.execution import NotebookFailure, execute, read_notebook
 from sec_lab.report.pages import network_loads, notebook_html, summarise
 
@@ -88,6 +88,23 @@ def test_only_what_changed_is_executed_again(project: Path, kernels: list[str]) 
     nbformat.write(changed, project / "notebooks" / "chapter10_last.ipynb")
     build_report(root=project, progress=False)
     assert kernels == ["2", "10", "10"]
+
+
+def test_the_size_of_explorers_is_told_and_one_that_is_too_large_is_a_failure(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stand_in(source: NotebookNode, **_: Any) -> NotebookNode:
+        done = nbformat.from_dict(source)
+        n = 4_999_000 if source.cells[-1].source == "2" else 5_001_000
+        data = {pages.SCRUBBER: "a" * n, "application/vnd.jupyter.widget-view+json": {}}
+        done.cells[-1].outputs = [nbformat.v4.new_output("display_data", data) for _ in range(2)]
+        return done
+
+    monkeypatch.setattr(build, "execute", stand_in)
+    first, last, _ = build_report(root=project, progress=False).pages
+    assert (first.explorer_bytes, first.error) == ((4_999_000, 4_999_000), "")
+    assert last.error == "chapter10_last.ipynb: expected explorers of at most 5 MB each, got 5.0 MB"
+    assert not last.page.exists()
 
 
 @pytest.mark.parametrize(

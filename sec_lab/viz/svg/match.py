@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 MOST_PERMUTATIONS = 100
 """Permutations of a match that are listed; there may be thousands."""
 
-_WIDTH_PX, _JOIN_PX, _ABOVE_PX, _BELOW_PX = 960.0, 64.0, 46.0, 62.0
+_WIDTH_PX, _JOIN_PX, _ABOVE_PX, _BELOW_PX = 960.0, 64.0, 46.0, 67.0
 _PICTURE_PX, _MOST_PRINTED = 56.0, 24
+_ROWS_EXPLAINED = "dot: may correspond (mutually best) · frame: corresponds"
 _EQUAL_PERCENT = 1e-9
 
 
@@ -187,7 +188,8 @@ def row_similarity_svg(match: Match, *, row_names: RowNames = "relations") -> st
     left = words_px(rows) + 12 if named else 20.0
     above = 0.72 * words_px(columns) + 22 if named else 20.0
     slant = 0.72 * words_px(columns) if named else 0.0
-    paper = Paper(left + k * cell + slant + 12, above + m * cell + 34, label="similarity of rows in percent")
+    wide = max(left + k * cell + slant, words_px([_ROWS_EXPLAINED], size_px=SMALL_PX))
+    paper = Paper(wide + 12, above + m * cell + 34, label="similarity of rows in percent")
     paper.words(0, 8, "similarity of rows ζ in %", size_px=SMALL_PX, soft=True)
     low = match.row_similarity.tolist()
     candidates = match.candidates
@@ -218,8 +220,7 @@ def row_similarity_svg(match: Match, *, row_names: RowNames = "relations") -> st
             x = left + (j + 0.5) * cell
             turn = f"rotate(-45 {x:.1f} {above - 8:.1f})"
             paper.words(x, above - 8, name, size_px=min(TEXT_PX, 0.8 * cell), transform=turn)
-    explained = "dot: may correspond (mutually best) · frame: corresponds"
-    paper.words(0, above + m * cell + 18, explained, size_px=SMALL_PX, soft=True)
+    paper.words(0, above + m * cell + 18, _ROWS_EXPLAINED, size_px=SMALL_PX, soft=True)
     return paper.markup()
 
 

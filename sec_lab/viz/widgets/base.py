@@ -19,8 +19,15 @@ Given = ParamSpec("Given")
 LABELS = {"description_width": "initial"}
 """Style of controls whose label is as long as it has to be."""
 
-WIDE = {"width": "360px"}
+WIDE = {"width": "420px"}
 """Layout of sliders: room for the label and for the slider."""
+
+
+TOGGLES = {**LABELS, "button_width": "auto"}
+"""Style of toggle buttons."""
+
+INSET = {"padding": "0 0 0 3px"}
+"""Layout of toggle buttons, whose label would else begin outside of its row, which cuts it off."""
 
 
 class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped

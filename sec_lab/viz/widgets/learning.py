@@ -11,7 +11,7 @@ from sec_lab.similarity import EFFORT, Normalizer, check_options
 from sec_lab.viz.exploring import Learned, Seen, chain_of, learn_and_compare
 from sec_lab.viz.svg.model import model_svg
 from sec_lab.viz.svg.paper import sentence
-from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import INSET, LABELS, TOGGLES, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 
 Demonstrations: TypeAlias = Sequence[Seen] | Mapping[str, Seen]
@@ -57,18 +57,19 @@ class LearningExplorer(Explorer):
             value=weight_threshold, min=0, max=1, step=0.05, description="weight threshold (share)", style=LABELS,
             readout_format=".2f", layout=WIDE,
         )  # fmt: skip
-        self.mode = widgets.ToggleButtons(
-            options=list(get_args(Mode)), description="mode", style={**LABELS, "button_width": "auto"}
-        )
+        self.mode = widgets.ToggleButtons(options=list(get_args(Mode)), description="mode", style=TOGGLES, layout=INSET)
         self.normalizer = widgets.ToggleButtons(
             options=[(f"{word} row", word) for word in get_args(Normalizer)], value=normalizer,
-            description="divide by the", style={**LABELS, "button_width": "auto"},
+            description="divide by the", style=TOGGLES, layout=INSET,
         )  # fmt: skip
         self.tolerance = widgets.IntSlider(
             value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS, layout=WIDE
         )
         self.said, self.drawing = widgets.HTML(), Drawing()
-        ticks = [widgets.HBox([self.ticks[name], self._likes[name]]) for name in self._given]
+        ticks = [
+            widgets.HBox([self.ticks[name], self._likes[name]], layout={"align_items": "center"})
+            for name in self._given
+        ]
         controls = row_of(self.weight_threshold, self.mode, self.normalizer, self.tolerance)
         self.show(row_of(self.everything, self.nothing, *ticks), controls, self.work_bar, self.said, self.drawing)
         self._worker = self.latest(self._show)

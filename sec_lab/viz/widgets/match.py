@@ -18,7 +18,7 @@ from sec_lab.viz.svg.match import (
     with_permutation,
 )
 from sec_lab.viz.svg.paper import data_address, sentence
-from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import INSET, LABELS, TOGGLES, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 
 Pictures: TypeAlias = Mapping[int, ArrayLike]
@@ -47,21 +47,21 @@ class MatchExplorer(Explorer):
             raise ValueError(f"row_names: expected one of {get_args(RowNames)}, got {row_names!r}")
         self.normalizer = widgets.ToggleButtons(
             options=[(f"{word} row", word) for word in get_args(Normalizer)], value=normalizer,
-            description="divide by the", style={**LABELS, "button_width": "auto"},
+            description="divide by the", style=TOGGLES, layout=INSET,
         )  # fmt: skip
         self.tolerance = widgets.IntSlider(
             value=round(tolerance_percent), min=0, max=100, description="tolerance (%)", style=LABELS, layout=WIDE
         )
         self.temporal_input = widgets.ToggleButtons(
             options=[("ξ_o", "original"), ("ξ_d", "derived")], description="columns of",
-            style={**LABELS, "button_width": "auto"},
+            style=TOGGLES, layout=INSET,
         )  # fmt: skip
         self.permutation = widgets.IntSlider(
             value=1, min=1, max=1, description="permutation (no.)", style=LABELS, layout=WIDE
         )
         self.names = widgets.ToggleButtons(
             options=[("ρ", "relations"), ("names", "names")], value=row_names, description="rows as",
-            style={**LABELS, "button_width": "auto"},
+            style=TOGGLES, layout=INSET,
         )  # fmt: skip
         self.said = widgets.HTML()
         self.chains, self.rows, self.roles = Drawing(), Drawing(), Drawing()

@@ -14,13 +14,13 @@ from sec_lab.viz.exploring import NoiseCurves, chain_of, noise_curves, noise_exa
 from sec_lab.viz.svg.curves import curves_svg
 from sec_lab.viz.svg.model import sample_svg
 from sec_lab.viz.svg.paper import sentence
-from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import INSET, LABELS, TOGGLES, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 
 N_SAMPLES = (10, 30, 100, 300, 1000)
 """Numbers of samples that can be chosen."""
 
-_NARROW = {"width": "220px"}
+_NARROW = {"width": "260px"}
 
 
 class NoiseExplorer(Explorer):
@@ -54,7 +54,7 @@ class NoiseExplorer(Explorer):
             readout_format=".2f", layout=WIDE,
         )  # fmt: skip
         self.mode = widgets.ToggleButtons(
-            options=list(get_args(Mode)), value=mode, description="mode", style={**LABELS, "button_width": "auto"}
+            options=list(get_args(Mode)), value=mode, description="mode", style=TOGGLES, layout=INSET
         )
         self.seed = widgets.Dropdown(options=list(self._seeds), description="seed chain", style=LABELS, layout=_NARROW)
         self.n_samples = widgets.Dropdown(

@@ -16,7 +16,7 @@ from sec_lab.viz.widgets.seen import KeptFrame, Labels
 
 _LEAST_HIGH, _MOST_WIDE, _GAP = 256, 640, 6
 _JPEG_QUALITY = 88
-_OUTLINE_PX = 1.0
+_OUTLINE_PX = 0.6
 _DIMMED = 0.4
 
 
@@ -133,7 +133,7 @@ class FramePanels:
         return [place * (self._wide + _GAP) for place, kind in enumerate(self._kinds) if kind != "depth"]
 
     def outlines(self, frame: KeptFrame | None) -> dict[int, str]:
-        """Borders of the segments of a frame as paths of SVG, in pixels of the first panel; whole to a pixel or so."""
+        """Borders of the segments of a frame as paths of SVG, in pixels of the first panel; true to a pixel."""
         import cv2
 
         labels = self.labels_of(frame)
@@ -237,6 +237,21 @@ def jpeg_bytes(picture: NDArray[np.uint8], *, quality: int = _JPEG_QUALITY) -> b
     options = [cv2.IMWRITE_JPEG_QUALITY, quality]
     options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
     done, data = cv2.imencode(".jpg", picture[..., ::-1], options)
+    assert done
+    return data.tobytes()
+
+
+def webp_bytes(picture: NDArray[np.uint8], *, quality: int) -> bytes:
+    """RGB picture as a WebP file: slower than JPEG, and less than half as large.
+
+    Examples
+    --------
+    >>> webp_bytes(np.zeros((4, 4, 3), dtype=np.uint8), quality=80)[8:12]
+    b'WEBP'
+    """
+    import cv2
+
+    done, data = cv2.imencode(".webp", picture[..., ::-1].copy(), [cv2.IMWRITE_WEBP_QUALITY, quality])
     assert done
     return data.tobytes()
 

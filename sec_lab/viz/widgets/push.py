@@ -14,7 +14,7 @@ from sec_lab.viz.svg.paper import png, sentence
 from sec_lab.viz.svg.pushed import pushed_svg, strip_svg, verdicts_html
 from sec_lab.viz.svg.table_top import place_of, table_svg
 from sec_lab.viz.watched import frames_at
-from sec_lab.viz.widgets.base import LABELS, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import INSET, LABELS, TOGGLES, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.drawing import Drawing
 from sec_lab.viz.widgets.latest import Turn
 from sec_lab.viz.widgets.picture import ClickablePicture
@@ -121,9 +121,10 @@ class PushExplorer(Explorer):
         )
         self.azimuth = _slider("camera azimuth (°)", -55, 55, 1)
         self.elevation = _slider("camera elevation (°)", 42, 62, 1)
-        wide = {**LABELS, "button_width": "auto"}
-        self.thing = widgets.ToggleButtons(options=self._names(), description="thing", style=wide)
-        self.shape = widgets.ToggleButtons(options=list(get_args(Form)), description="shape", style=wide)
+        self.thing = widgets.ToggleButtons(options=self._names(), description="thing", style=TOGGLES, layout=INSET)
+        self.shape = widgets.ToggleButtons(
+            options=list(get_args(Form)), description="shape", style=TOGGLES, layout=INSET
+        )
         self.x, self.y = _slider("x (m)", *_X_M, 0.005), _slider("y (m)", *_Y_M, 0.005)
         self.turn, self.size = _slider("turn (°)", *_TURN_DEG, 1), _slider("size (mm)", *_SIZE_MM, 1)
         hint = "click a thing to choose it, click beside it to move the chosen one there"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sec_lab.viz.style import RELATION_WORD
 from sec_lab.viz.tint import strong_colour
 from sec_lab.viz.widgets.book import ChainBook
-from sec_lab.viz.widgets.panels import jpeg_bytes
+from sec_lab.viz.widgets.panels import webp_bytes
 
 FOR_PAGES = "SEC_LAB_FOR_PAGES"
 """Environment variable that is set while the report executes notebooks."""
@@ -50,7 +50,7 @@ def scrubber_html(book: ChainBook, *, most_bytes: int = MOST_BYTES) -> str:
     >>> labels = np.ones((3, 20, 30), dtype=np.uint8)
     >>> labels[1:, 5:15, 5:15] = 2
     >>> page = scrubber_html(ChainBook(see(Segmentation.from_labels(labels))))
-    >>> page.count("data:image/jpeg") > 3, "://" in page
+    >>> page.count("data:image/webp") > 3, "://" in page
     (True, False)
     """
     # Imported when it is used: a live explorer needs no templates.
@@ -107,8 +107,8 @@ def _within(book: ChainBook, most_bytes: int) -> tuple[list[int], list[str]]:
             for place in places:
                 book.go_to(place)
                 drawn = _narrow(book.panels.draw(book.frame, column=book.column))
-                data = base64.b64encode(jpeg_bytes(drawn, quality=quality)).decode()
-                pictures.append(f"data:image/jpeg;base64,{data}")
+                data = base64.b64encode(webp_bytes(drawn, quality=quality)).decode()
+                pictures.append(f"data:image/webp;base64,{data}")
                 n_bytes += len(pictures[-1])
                 if n_bytes > most_bytes:
                     break

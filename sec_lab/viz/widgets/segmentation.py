@@ -16,7 +16,7 @@ from sec_lab.segmentation.quality import covering
 from sec_lab.viz.exploring import FollowedMovie, SegmentedFrame, beside_each_other, followed_movie, segmented_frame
 from sec_lab.viz.frame_shelf import FrameShelf
 from sec_lab.viz.svg.paper import jpeg, sentence
-from sec_lab.viz.widgets.base import LABELS, WIDE, Explorer, never_raises, row_of
+from sec_lab.viz.widgets.base import INSET, LABELS, TOGGLES, WIDE, Explorer, never_raises, row_of
 from sec_lab.viz.widgets.latest import Turn
 from sec_lab.viz.widgets.picture import ClickablePicture
 
@@ -80,7 +80,7 @@ class SegmentationExplorer(Explorer):
         self.minimum_thickness_px = _whole("minimum thickness (px)", parameters.minimum_thickness_px, 0, 12)
         self.colour_space = widgets.ToggleButtons(
             options=list(get_args(ColourSpace)), value=parameters.colour_space, description="colours in",
-            style={**LABELS, "button_width": "auto"},
+            style=TOGGLES, layout=INSET,
         )  # fmt: skip
         self.follow = widgets.Button(
             description="Follow through the movie", disabled=n_frames == 1, layout={"width": "auto"},

@@ -1,6 +1,7 @@
 """Explorers on a page without a kernel: what they show at some places of one slider, made beforehand."""
 
 import base64
+import gzip
 import hashlib
 import html
 import json
@@ -27,16 +28,20 @@ _PAGE = """<div class="sec-lab-still" id="KEY">
 </style>
 <label><span>NAME</span><input type="range" min="0" max="LAST" value="BEGIN"><output>VALUE</output></label>
 <div class="shown">SHOWN</div>
-<script type="application/json">DATA</script>
 <script>
-(() => {
+(async () => {
   const all = document.getElementById("KEY");
-  const steps = JSON.parse(all.querySelector("script[type='application/json']").textContent);
   const [slider, output, shown] = ["input", "output", ".shown"].map((what) => all.querySelector(what));
-  slider.addEventListener("input", () => {
-    output.textContent = steps[slider.value].value;
-    shown.innerHTML = steps[slider.value].shown;
-  });
+  const packed = Uint8Array.from(atob("DATA"), (letter) => letter.charCodeAt(0));
+  const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const { values, pieces, steps } = await new Response(unpacked).json();
+  const show = () => {
+    output.textContent = values[slider.value];
+    shown.innerHTML = steps[slider.value].map((piece) => pieces[piece]).join("");
+  };
+  slider.addEventListener("input", show);
+  // It may have been moved before.
+  if (slider.value !== "BEGIN") show();
 })();
 </script>
 </div>
@@ -92,25 +97,36 @@ def still_html(
     for value in values:
         control.value = value
         wait()
-        steps.append({"value": f"{value:g}", "shown": shown_html(explorer)})
+        steps.append((float(value), list(_pieces(explorer))))
     control.value = begin
     wait()
-    places = [float(value) for value in values]
-    while steps and len(json.dumps(steps)) > most_bytes:
-        steps, places = (steps[::2], places[::2]) if len(steps) > 1 else ([], [])
+    while steps and len(_packed(steps)) > most_bytes:
+        steps = steps[::2] if len(steps) > 1 else []
     if not steps:
         raise ValueError(f"values: expected one that is shown within {most_bytes} bytes, got none")
-    first = min(range(len(steps)), key=lambda i: abs(places[i] - begin))
-    # In a script no tag may end, whatever the names are.
-    data = json.dumps(steps).replace("<", "\\u003c")
+    first = min(range(len(steps)), key=lambda i: abs(steps[i][0] - begin))
+    data = _packed(steps)
     parts = {
         "KEY": f"still-{hashlib.sha256(data.encode()).hexdigest()[:12]}", "NAME": html.escape(str(control.description)),
-        "LAST": str(len(steps) - 1), "BEGIN": str(first), "VALUE": steps[first]["value"],
+        "LAST": str(len(steps) - 1), "BEGIN": str(first), "VALUE": f"{steps[first][0]:g}",
     }  # fmt: skip
     page = _PAGE
     for name, text in parts.items():
         page = page.replace(name, text)
-    return page.replace("SHOWN", steps[first]["shown"], 1).replace("DATA", data, 1)
+    return page.replace("DATA", data, 1).replace("SHOWN", "".join(steps[first][1]), 1)
+
+
+def _packed(steps: Sequence[tuple[float, list[str]]]) -> str:
+    """Values and what is shown at each; what is shown at several is there once, and all of it is compressed."""
+    pieces = list(dict.fromkeys(piece for _, shown in steps for piece in shown))
+    place = {piece: number for number, piece in enumerate(pieces)}
+    whole = {
+        "values": [f"{value:g}" for value, _ in steps],
+        "pieces": pieces,
+        "steps": [[place[piece] for piece in shown] for _, shown in steps],
+    }
+    # Without a date, so that the same explorer is the same page.
+    return base64.b64encode(gzip.compress(json.dumps(whole).encode(), mtime=0)).decode("ascii")
 
 
 def _pieces(widget: widgets.Widget) -> Iterator[str]:
