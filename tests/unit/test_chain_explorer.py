@@ -5,6 +5,7 @@ import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from sec_lab import Observation, Recording, SceneGraph, Segmentation
 from sec_lab.observation import merge_segments
 from sec_lab.recording import Frame
 from sec_lab.segmentation.merging import merged_segments
-from sec_lab.viz.widgets import chain_explorer
+from sec_lab.viz.widgets import chain_explorer, own_movie
 from sec_lab.viz.widgets.book import ChainBook
 from sec_lab.viz.widgets.chain_table import DARK, ChainTable
 from sec_lab.viz.widgets.explorer import ChainExplorer
@@ -303,8 +304,7 @@ def test_errors_are_sentences_and_the_widget_lives_on(seen: Seen, tmp_path: Path
     mismatch = chain_explorer(Segmentation.from_labels(labels_of_movie()), recording=np.zeros((12, 8, 8, 3), np.uint8))
     assert mismatch.wait().alert.startswith("masks: expected masks of 8×8")
     for wrong in ({"source": 7}, {"source": tmp_path, "recording": 7}):
-        with pytest.raises(ValueError, match="expected a"):
-            chain_explorer(**wrong)  # type: ignore[arg-type]
+        assert "expected a" in chain_explorer(**wrong).wait().alert  # type: ignore[arg-type]
 
 
 def test_work_that_takes_long_shows_how_far_it_is_and_can_be_stopped(seen: Seen) -> None:
@@ -374,3 +374,24 @@ def test_names_are_text_on_the_page(book: ChainBook) -> None:
     page = scrubber_html(book)
     assert "<b>cup" not in page
     assert "&lt;b&gt;cup" in page
+
+
+def test_arrays_are_explored_in_one_line_and_what_is_wrong_is_said() -> None:
+    labels = np.ones((3, 20, 30), dtype=np.uint8)
+    labels[1:, 5:15, 5:15] = 2
+    frames = np.repeat(40 * labels[..., np.newaxis], 3, axis=3)
+    for explorer in (chain_explorer(labels), chain_explorer(labels, recording=frames), chain_explorer(frames)):
+        book = explorer.wait().book
+        assert book is not None
+        assert len(book.numbers) == 3
+    wrong: dict[str, Any] = {
+        "source: expected an Observation": [],
+        "frames: expected at least one frame": frames[:0],
+        "frames: expected": frames.astype(float),
+    }
+    for said, source in wrong.items():
+        explorer = chain_explorer(source).wait()
+        assert explorer.book is None
+        assert said in explorer.alert
+    assert "recording: expected a Recording" in chain_explorer(labels, recording=3).wait().alert
+    assert "path: expected a path, got ndarray" in own_movie(frames).explorer.alert

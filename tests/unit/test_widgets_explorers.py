@@ -3,6 +3,7 @@
 import base64
 import gc
 import gzip
+import html
 import json
 import re
 import threading
@@ -312,13 +313,13 @@ def test_truth_of_another_size_is_a_sentence_and_a_frame_beyond_it_too() -> None
     frames, truth = scene()
     explorer = segmentation_explorer(frames, truth[:, ::2])
     explorer.wait()
-    assert "labels: expected shape (24, 64) like the truth, got (48, 64)" in explorer.trouble.value
+    assert "truth: expected label images of 48×64 like the frames, got 24×64" in explorer.trouble.value
     explorer = segmentation_explorer(frames, truth[:1])
     explorer.wait()
     assert explorer.trouble.value == ""
     explorer.frame.value = 2
     explorer.wait()
-    assert "frame: expected one from 0 to 0, got 2" in explorer.trouble.value
+    assert "truth: expected a label image for every frame, got none for frame 2" in explorer.trouble.value
     explorer.frame.value = 0
     explorer.wait()
     assert explorer.trouble.value == ""
@@ -340,6 +341,23 @@ def test_controls_have_labels_with_units() -> None:
         assert sliders or isinstance(explorer, Explorer)
         for slider in sliders:
             assert any(unit in slider.description for unit in units), slider.description
+
+
+def test_whatever_is_given_no_explorer_raises() -> None:
+    movie, truth = scene(3)
+    said = {
+        "titles: expected two": match_explorer(LIFTING, LIFTING, titles=("one",)),
+        "parameters: expected PottsParameters": segmentation_explorer(movie, parameters=3),
+        "frame: expected a whole number": segmentation_explorer(movie, frame="first"),
+        "truth: expected a label image for every frame, got none for frame 2": segmentation_explorer(
+            movie, truth[:1], frame=2
+        ),
+        "truth: expected label images of": segmentation_explorer(movie, truth[:, :-4]),
+        "trait of a FloatSlider instance expected a float": learning_explorer([LIFTING] * 2, weight_threshold="much"),
+    }
+    for sentence, explorer in said.items():
+        explorer.wait()
+        assert sentence in html.unescape(explorer.trouble.value)
 
 
 def unpacked(page: str) -> tuple[list[float], list[str]]:

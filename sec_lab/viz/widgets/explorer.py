@@ -18,7 +18,7 @@ from sec_lab.viz.widgets.book import ChainBook
 from sec_lab.viz.widgets.chain_table import DARK, LIGHT
 from sec_lab.viz.widgets.picture import ClickablePicture
 from sec_lab.viz.widgets.scrubber import FOR_PAGES, SCRUBBER, scrubber_html
-from sec_lab.viz.widgets.seen import How, Seen, see
+from sec_lab.viz.widgets.seen import MOST_FRAMES, How, Seen, see
 from sec_lab.viz.widgets.sentences import as_alert, sentence_of
 from sec_lab.viz.widgets.work import Work
 
@@ -30,7 +30,7 @@ _KEYS = (
     "click a cell, a row's name, a key frame or a segment"
 )
 
-Source = Observation | Recording | Segmentation | str | os.PathLike[str]
+Source = Observation | Recording | Segmentation | NDArray[Any] | str | os.PathLike[str]
 Movie = Recording | NDArray[np.uint8] | str | os.PathLike[str]
 
 
@@ -49,9 +49,10 @@ def chain_explorer(
 
     Parameters
     ----------
-    source : Observation, Recording, Segmentation or path-like
-        What was observed, or a movie or label images that are observed now. Work that takes long is done beside the
-        notebook, with a progress bar and a button that stops it.
+    source : Observation, Recording, Segmentation, ndarray or path-like
+        What was observed, or a movie or label images that are observed now; an array holds frames, (n, height, width,
+        3) uint8, or label images, (n, height, width). Work that takes long is done beside the notebook, with a progress
+        bar and a button that stops it.
     recording : Recording, (n, height, width, 3) ndarray of uint8 or path-like, optional
         The movie that an observation or label images belong to; without it, segments are drawn on paper.
     segmentation
@@ -65,12 +66,8 @@ def chain_explorer(
     Returns
     -------
     ChainExplorer
-        A widget. Its ``book`` holds what is shown: ``book.observation`` with names and merged segments.
-
-    Raises
-    ------
-    ValueError
-        If the source or the recording is something else. What is wrong with a file or a frame is said in the widget.
+        A widget. Its ``book`` holds what is shown: ``book.observation`` with names and merged segments. What is wrong
+        with what was given is said in it.
 
     Examples
     --------
@@ -80,16 +77,34 @@ def chain_explorer(
     >>> explorer.wait().book.observation.key_frames
     array([0])
     """
-    if not isinstance(source, Observation | Recording | Segmentation | str | os.PathLike):
-        raise ValueError(
-            f"source: expected an Observation, a Recording, a Segmentation or a path, got {type(source).__name__}"
-        )
-    movie = Recording.from_frames(recording) if isinstance(recording, np.ndarray) else recording
-    if not isinstance(movie, Recording | str | os.PathLike | None):
-        raise ValueError(f"recording: expected a Recording, frames or a path, got {type(recording).__name__}")
     return ChainExplorer(
-        lambda tell: see(source, recording=movie, segmentation=segmentation, how=how, names=names, tell=tell)
+        lambda tell: see(
+            _as_source(source),
+            recording=_as_movie(recording),
+            segmentation=segmentation,
+            how=how,
+            names=names,
+            tell=tell,
+        )
     )
+
+
+def _as_source(source: object) -> Observation | Recording | Segmentation | str | os.PathLike[str]:
+    """What can be observed; arrays are frames if they have colours, and label images if not."""
+    if isinstance(source, np.ndarray):
+        return Recording.from_frames(source) if source.ndim == 4 else Segmentation.from_labels(source)
+    if isinstance(source, Observation | Recording | Segmentation | str | os.PathLike):
+        return source
+    kind = type(source).__name__
+    raise ValueError(f"source: expected an Observation, a Recording, a Segmentation, an array or a path, got {kind}")
+
+
+def _as_movie(recording: object) -> Recording | str | os.PathLike[str] | None:
+    if isinstance(recording, np.ndarray):
+        return Recording.from_frames(recording)
+    if not isinstance(recording, Recording | str | os.PathLike | None):
+        raise ValueError(f"recording: expected a Recording, frames or a path, got {type(recording).__name__}")
+    return recording
 
 
 class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
@@ -123,8 +138,9 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
         self._work = Work(on_done=self._show, on_failed=self.say)
         self._frame = ClickablePicture(description="frame with segments and scene graph", tooltip=_KEYS)
         self._chain = ClickablePicture(description="event chain", tooltip=_KEYS)
+        # In the page the key End goes no further than to where a slider ended at first.
         self._place = ipywidgets.IntSlider(
-            min=0, max=1, readout=False, layout={"flex": "1 1 auto", "min_width": "180px"}
+            min=0, max=MOST_FRAMES, readout=False, layout={"flex": "1 1 auto", "min_width": "180px"}
         )
         self._play = ipywidgets.Play(min=0, max=1, interval=_LEAST_INTERVAL_MS)
         self._told = ipywidgets.Label("", layout={"min_width": "220px"})

@@ -6,11 +6,13 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
+import traitlets
+
 from sec_lab.viz.widgets.sentences import sentence_of
 
 T = TypeVar("T")
 
-TROUBLES = (TypeError, ValueError, OSError)
+TROUBLES = (TypeError, ValueError, OSError, traitlets.TraitError)
 """Errors that say in a sentence what was expected and what came."""
 
 PATIENCE_S = 0.08

@@ -77,6 +77,8 @@ class MatchExplorer(Explorer):
         pictures: tuple[Pictures, Pictures] = ({}, {}),
     ) -> None:  # fmt: skip
         """Show another pair; parameters and errors are those of :func:`match_explorer`."""
+        if isinstance(titles, str) or not isinstance(titles, Sequence) or len(titles) != 2:
+            raise ValueError(f"titles: expected two, got {titles!r}")
         self._pair = chain_of(one, "one"), chain_of(other, "other")
         self._titles = titles
         self._pictures = _addresses(pictures)

@@ -54,6 +54,12 @@ def own_movie(
     >>> "there is no such file" in widget.explorer.alert
     True
     """
+    options: dict[str, object] = {"path": path, "masks": masks, "folder": folder}
+    for name, given in options.items():
+        if not isinstance(given, str | os.PathLike):
+            widget = OwnMovie("", masks="", folder=".")
+            widget.explorer.say(f"{name}: expected a path, got {type(given).__name__}; chain_explorer takes arrays.")
+            return widget
     return OwnMovie(path, masks=masks, folder=folder)
 
 

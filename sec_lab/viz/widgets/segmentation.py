@@ -54,6 +54,10 @@ class SegmentationExplorer(Explorer):
 
     def __init__(self, recording: Movie, truth: Truth | None, *, frame: int, parameters: PottsParameters) -> None:
         super().__init__()
+        if not isinstance(parameters, PottsParameters):
+            raise TypeError(f"parameters: expected PottsParameters, got {type(parameters).__name__}")
+        if isinstance(frame, bool) or not isinstance(frame, int | np.integer):
+            raise TypeError(f"frame: expected a whole number, got {frame!r}")
         movie = _as_recording(recording)
         n_frames = _count(movie)
         if not 0 <= frame < n_frames:
@@ -166,7 +170,7 @@ class SegmentationExplorer(Explorer):
         self, place: int, parameters: PottsParameters, followed: FollowedMovie | None, turn: Turn
     ) -> _Shown:  # fmt: skip
         frame = self._frames.at(place, report=turn.report)
-        truth = None if self._truth is None else np.asarray(self._truth.at(place, report=turn.report))
+        truth = None if self._truth is None else self._true_labels(place, frame.image.shape[:2], turn)
         if followed is not None and place < len(followed.labels):
             labels_here = followed.labels[place]
             found = SegmentedFrame(labels_here, None if truth is None else covering(labels_here, truth))
@@ -176,6 +180,17 @@ class SegmentationExplorer(Explorer):
         picture = beside_each_other(frame.image, *labels)
         step = -(-frame.image.shape[0] // picture.shape[0])
         return _Shown(place, frame.index, found, truth, jpeg(picture), step)
+
+    def _true_labels(self, place: int, size: tuple[int, ...], turn: Turn) -> NDArray[np.integer[Any]]:
+        assert self._truth is not None
+        try:
+            labels = np.asarray(self._truth.at(place, report=turn.report))
+        except ValueError:
+            raise ValueError(f"truth: expected a label image for every frame, got none for frame {place}") from None
+        if labels.shape != size:
+            expected, came = ("×".join(map(str, shape)) for shape in (size, labels.shape))
+            raise ValueError(f"truth: expected label images of {expected} like the frames, got {came}")
+        return labels
 
     def _show(self, shown: _Shown) -> None:
         self._shown = shown
