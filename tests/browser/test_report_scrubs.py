@@ -6,6 +6,7 @@ from pathlib import Path
 import nbformat
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser
 
 from sec_lab.report import build_report
@@ -19,6 +20,7 @@ def test_explorers_scrub_on_a_page_without_network(
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     cells = [nbformat.v4.new_markdown_cell("# Explorer\n\nOne movie."), nbformat.v4.new_code_cell(MOVIE)]
+    cells.append(nbformat.v4.new_code_cell("from sec_lab import viz\n\nviz.draw_graph_3d(seen)"))
     (tmp_path / "notebooks").mkdir()
     nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "notebooks" / "chapter.ipynb")
     (tmp_path / "requirements.lock").write_text("")
@@ -80,6 +82,16 @@ def test_explorers_scrub_on_a_page_without_network(
     scrubber.get_by_role("button", name="play").click()
     page.wait_for_function("document.querySelector('.scrubber output').textContent.startsWith('frame 3 ')")
     screenshot(page, "report_scrubber")
+
+    # The 3D view unpacks itself, and shows spheres and tubes on light paper.
+    view = page.locator("iframe[title='scene graph']")
+    view.scroll_into_view_if_needed()
+    view.content_frame.locator("canvas").first.wait_for(timeout=60_000)
+    view.content_frame.get_by_text("yellow vessel").wait_for()
+    page.wait_for_timeout(500)
+    pixels = np.asarray(Image.open(screenshot(view, "report_graph_3d")).convert("RGB")).astype(int)
+    assert (pixels.max(axis=2) - pixels.min(axis=2) > 60).mean() > 0.01
+    assert (pixels.min(axis=2) > 230).mean() > 0.3
     assert errors == []
     assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
     page.close()
