@@ -13,7 +13,7 @@ from tests.browser.conftest import SCREENS, Lab
 from tests.browser.test_chain_explorer import FILMED, PIXEL
 from tests.browser.test_explorers import CHAINS
 
-N_MOVES = 30
+N_MOVES = 20
 
 
 @dataclass(frozen=True)
