@@ -31,12 +31,14 @@ from sec_lab.viz.widgets import (
     learning_explorer,
     match_explorer,
     noise_explorer,
+    push_explorer,
     segmentation_explorer,
     table_explorer,
 )
 from sec_lab.viz.widgets.base import Explorer
 from sec_lab.viz.widgets.scrubber import FOR_PAGES, SCRUBBER
 from sec_lab.viz.widgets.still import shown_html, still_html
+from sec_lab.worlds.katana import View
 
 TYPES = ["putting", "pouring"]
 
@@ -432,6 +434,17 @@ def moves_of(kind: str) -> Callable[[int], None]:
             learning.wait()
 
         return learn_anew
+    if kind == "push":
+        push = push_explorer()
+        # Of the arm's own process another test takes care.
+        seen = View(np.zeros((256, 320, 3), np.uint8), np.ones((256, 320), np.float32), push.scene.camera)
+        push._arm.look = lambda _: seen
+
+        def place_anew(i: int) -> None:
+            push.x.value = 0.2 + (i % 40) / 200
+            push.wait()
+
+        return place_anew
     frames, _ = scene(2)
     segmentation = segmentation_explorer(frames)
 
@@ -443,7 +456,7 @@ def moves_of(kind: str) -> Callable[[int], None]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["match", "table", "noise", "learning", "segmentation"])
+@pytest.mark.parametrize("kind", ["match", "table", "noise", "learning", "segmentation", "push"])
 def test_nothing_is_left_behind_by_a_thousand_moves(kind: str) -> None:
     n_moves = 1000
     move = moves_of(kind)
