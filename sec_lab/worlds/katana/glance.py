@@ -1,5 +1,6 @@
 """What a camera sees of a scene before anything moves; of scenes that differ in poses only, at once."""
 
+import gc
 from dataclasses import replace
 from typing import Any
 
@@ -51,6 +52,10 @@ class Glance:
     def _bench_of(self, scene: Scene) -> tuple[Bench, Any, Any]:
         things = tuple(replace(thing, p_W_m=(0.0, 0.0, 0.0), yaw_rad=0.0) for thing in scene.things)
         if self._built is None or things != self._things:
+            if self._built is not None:
+                # Drake's diagrams hang in cycles, and a renderer is large.
+                self._built = None
+                gc.collect()
             bench = build(scene)
             context = bench.diagram.CreateDefaultContext()
             self._things = things
