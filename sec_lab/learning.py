@@ -31,8 +31,8 @@ Mode = Literal["batch", "online"]
 Demonstration: TypeAlias = EventChain | Observation
 Demonstrations: TypeAlias = Sequence[Demonstration] | Mapping[str, Demonstration]
 
-WEIGHT_THRESHOLD = 0.5
-"""Share of the demonstrations that a row or column of a model needs: what most of them have."""
+WEIGHT_THRESHOLD = 0.51
+"""Share of the demonstrations that a row or column of a model needs: what most of them have, not just every second."""
 
 TYPE_THRESHOLD_PERCENT = 64.0
 """Least similarity of type-similar manipulations (§2.7)."""

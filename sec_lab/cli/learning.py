@@ -33,7 +33,11 @@ def add_learning_commands(commands: Commands) -> None:
         help="most typical first, or as they come",
     )
     learn.add_argument(
-        "--threshold", type=float, default=0.5, metavar="WEIGHT", help="least weight of rows and columns (default: 0.5)"
+        "--threshold",
+        type=float,
+        default=0.51,
+        metavar="WEIGHT",
+        help="least weight of rows and columns (default: 0.51, more than half of the demonstrations)",
     )
     add_similarity_options(learn)
     learn.set_defaults(run=_learn)

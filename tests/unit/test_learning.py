@@ -43,6 +43,15 @@ def test_weights_are_normalised_occurrences_and_what_is_rare_is_deleted():
     assert len(learn([without, without, without, whole]).row_weights) == 3
 
 
+def test_what_every_second_demonstration_has_is_not_common():
+    """Most have to have it; a threshold that is given is the least weight."""
+    whole = sl.EventChain([*PUTTING, [0, 2, 0, 2, 0, 2]], [*PAIRS, (1, 5)])
+    halves = [whole, sl.EventChain(PUTTING, PAIRS)] * 2
+    for mode in ("batch", "online"):
+        assert rows_of(learn(halves, mode=mode).chain) == sorted(map(tuple, PUTTING)), mode
+        assert sorted(learn(halves, mode=mode, weight_threshold=0.5).row_weights.tolist()) == [0.5, 1, 1, 1], mode
+
+
 @pytest.mark.parametrize("order", range(4))
 def test_a_row_that_only_the_most_typical_one_lacks_is_appended(order):
     whole = sl.EventChain([*PUTTING, [0, 2, 0, 2, 0, 2]], [*PAIRS, (1, 5)])
