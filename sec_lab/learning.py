@@ -331,7 +331,7 @@ def _gather(packed: Packed, options: Options, n_threads: int | None) -> Frame:
     strong_rows, strong_columns = profile.strong
     likely = profile.row_counts >= LEAST_COUNT, profile.column_counts >= LEAST_COUNT
     rows, columns = (
-        weak & (counts >= options.threshold / 2 * profile.n)
+        weak & (counts >= options.threshold_so_far / 2 * profile.n)
         for weak, counts in zip(likely, (profile.row_counts, profile.column_counts), strict=True)
     )
     if not rows.any():
