@@ -196,6 +196,12 @@ def test_a_threshold_that_leaves_nothing_is_refused():
         learn(chains, weight_threshold=0.8)
 
 
+@pytest.mark.parametrize(("n", "told"), [(0, "none"), (2, "2")])
+def test_types_are_found_among_three_at_least(n, told):
+    with pytest.raises(ValueError, match=f"demonstrations: expected at least three, got {told}"):
+        learn_types([GOOD] * n)
+
+
 def test_something_else_than_a_chain_is_refused():
     with pytest.raises(TypeError, match="demonstration 2: expected an event chain or an observation, got list"):
         learn([GOOD, [[0, 2]]])
