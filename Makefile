@@ -1,7 +1,8 @@
 # Everything runs in .venv, which `setup` builds from requirements.lock once and again only when it has to.
 # make PYTHON=python3.12 chooses the interpreter that .venv is built on.
 PYTHON ?=
-# make bench SEEDS=11,12 MOVIES=8 judges on 8 tabletop movies of each of these seeds, which are rendered first.
+# make bench SEEDS=11,12 MOVIES=8 judges on 8 tabletop movies, and on 8 of putting and taking, of each of these seeds;
+# they are rendered first.
 SEEDS ?=
 MOVIES ?=
 BIN := .venv/bin

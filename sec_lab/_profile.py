@@ -43,9 +43,18 @@ class Options:
     effort: int
     threshold: float
 
+    @property
+    def threshold_so_far(self) -> float:
+        """While a model grows, what half of those so far have is not weak: it is deleted at the end (§2.9)."""
+        return min(self.threshold, 0.5)
+
     def often(self, counts: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
-        """Rows or columns that enough of n demonstrations have."""
+        """Rows or columns that enough of all n demonstrations have."""
         return np.asarray(growing.often(counts, n, self.threshold), np.bool_)
+
+    def often_so_far(self, counts: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
+        """Rows or columns that enough of the first n demonstrations have."""
+        return np.asarray(growing.often(counts, n, self.threshold_so_far), np.bool_)
 
 
 class Packed:
@@ -105,7 +114,7 @@ class Profile:
     Rows and columns that too few demonstrations have are *weak*: they are kept, because later ones may have them too,
     but are only offered what the strong ones leave over. Their number stays bounded by lossy counting (Manku and
     Motwani, 2002): every ⌈1 / ε⌉ demonstrations, those are forgotten that were seen less than ε-often since they came.
-    So no row or column whose share is the threshold is ever forgotten for good, and ω is too small by at most ε.
+    So no row or column whose share is that threshold is ever forgotten for good, and ω is too small by at most ε.
 
     Attributes
     ----------
@@ -152,7 +161,8 @@ class Profile:
     @property
     def strong(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Rows and columns that enough demonstrations have."""
-        return self.options.often(self.row_counts, self.n), self.options.often(self.column_counts, self.n)
+        often = self.options.often_so_far
+        return often(self.row_counts, self.n), often(self.column_counts, self.n)
 
     def align(self, codes: NDArray[np.uint8]) -> Alignment:
         """Rows and columns of the model in a chain."""
@@ -167,7 +177,7 @@ class Profile:
     def add(self, codes: NDArray[np.uint8], alignment: Alignment) -> None:
         """Raise the weights of what the chain has too, and append what it has besides."""
         # Departure: unseen columns are inserted too, so that a first example without some event can be outgrown.
-        threshold = self.options.threshold
+        threshold = self.options.threshold_so_far
         self._state = growing.add(self._state, self.n, codes, alignment.rows, alignment.columns, threshold)
         self.n += 1
 
@@ -176,7 +186,7 @@ class Profile:
         options = self.options
         self._state = growing.grow(
             self._state, self.n, order, packed.codes, packed.code_starts, packed.n_changing, packed.n_columns,
-            options.threshold, int(options.shorter), options.tolerance_percent, options.effort,
+            options.threshold_so_far, int(options.shorter), options.tolerance_percent, options.effort,
         )  # fmt: skip
         self.n += len(order)
 

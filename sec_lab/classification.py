@@ -23,6 +23,9 @@ Classes: TypeAlias = "pd.Series[Any] | ArrayLike"
 # Percentages are quotients of whole numbers; differences below this come from rounding.
 _ROUNDING_PERCENT = 1e-9
 
+# Jolliffe (1972): of a principal component of correlations that is kept.
+_LEAST_EIGENVALUE = 0.7
+
 
 def type_similar(table: Table, *, threshold_percent: float) -> NDArray[np.bool_]:
     """Which pairs of manipulations are similar enough to be of the same type (§2.6.2, §2.7).
@@ -176,7 +179,7 @@ def unsupervised_classes(
         Where k-means gets its random starts; ``numpy.random.default_rng(0)`` if left out, so the same table always has
         the same classes.
     k_max : int, optional
-        Greatest number of classes; n / 2 if left out.
+        Greatest number of classes; n / 2, but no more than :func:`most_classes`, if left out.
 
     Returns
     -------
@@ -193,6 +196,8 @@ def unsupervised_classes(
     -----
     The n features are not independent of each other: with four classes they hardly leave a space of three dimensions.
     The criterion of X-means takes every feature for evidence of its own and would find more than twice as many classes.
+    Versions of a type that are nearly the same leave no spread either, and are parted by whatever little differs, such
+    as a thing that stands aside in some of them: so the number of classes is limited by what the correlations span.
     Classes are told apart by contrast: a table of a single type has none, and its noise is not always left whole.
 
     Examples
@@ -209,14 +214,48 @@ def unsupervised_classes(
     if np.ptp(values) == 0:
         return np.zeros(len(values), np.int64)
     features = correlation_features(table)
-    # Departure: the number of classes is chosen with the dimensions that the features fill, not with their number n.
+    # Departure: the number of classes is chosen with the dimensions that the features fill, not with their number n;
+    # and it is limited by what the correlations span.
     found = x_means(
         features,
         rng=np.random.default_rng(0) if rng is None else rng,
-        k_max=k_max,
+        k_max=min(max(1, len(values) // 2), most_classes(table)) if k_max is None else k_max,
         n_dimensions=principal_dimensions(features),
     )
     return found.labels.copy()
+
+
+def most_classes(table: Table) -> int:
+    """Greatest number of classes that the correlations between the columns of a table tell apart.
+
+    The columns of k classes that differ from each other span k − 1 dimensions; what is left is spread within classes.
+    How many principal components of a correlation matrix are to be kept is an old question, and the usual answer is a
+    least eigenvalue: 1 is the share of a single variable (Kaiser, 1960), 0.7 allows for chance (Jolliffe, 1972).
+
+    Parameters
+    ----------
+    table : (n, n) pandas.DataFrame or array_like of float
+        Similarities in percent; at least three rows.
+
+    Returns
+    -------
+    int
+        1 more than :func:`correlation_features` has eigenvalues of at least 0.7.
+
+    Raises
+    ------
+    ValueError
+        As in :func:`correlation_features`.
+
+    Examples
+    --------
+    >>> most_classes([[100, 90, 30, 35], [90, 100, 40, 30], [30, 40, 100, 80], [35, 30, 80, 100]])
+    2
+    """
+    features = correlation_features(table)
+    with _one_thread():
+        eigenvalues = np.linalg.eigvalsh(features)
+    return int(np.count_nonzero(eigenvalues >= _LEAST_EIGENVALUE)) + 1
 
 
 def principal_dimensions(features: ArrayLike, *, share_percent: float = 95.0) -> int:

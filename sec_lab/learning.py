@@ -31,8 +31,8 @@ Mode = Literal["batch", "online"]
 Demonstration: TypeAlias = EventChain | Observation
 Demonstrations: TypeAlias = Sequence[Demonstration] | Mapping[str, Demonstration]
 
-WEIGHT_THRESHOLD = 0.5
-"""Share of the demonstrations that a row or column of a model needs: what most of them have."""
+WEIGHT_THRESHOLD = 0.51
+"""Share of the demonstrations that a row or column of a model needs: what most of them have, not just every second."""
 
 TYPE_THRESHOLD_PERCENT = 64.0
 """Least similarity of type-similar manipulations (§2.7)."""
@@ -297,7 +297,9 @@ def learn_types(
     from sec_lab.classification import unsupervised_classes
     from sec_lab.similarity import similarity_table
 
-    names, given = _as_demonstrations(demonstrations)
+    names, given = _as_demonstrations(demonstrations, at_least="three")
+    if len(given) < LEAST_COUNT + 1:
+        raise ValueError(f"demonstrations: expected at least three, got {len(given)}")
     table = similarity_table(
         {name: _chain_of(one) for name, one in zip(names, given, strict=True)}, normalizer=normalizer,
         tolerance_percent=tolerance_percent, effort=effort, n_threads=n_threads,
@@ -331,7 +333,7 @@ def _gather(packed: Packed, options: Options, n_threads: int | None) -> Frame:
     strong_rows, strong_columns = profile.strong
     likely = profile.row_counts >= LEAST_COUNT, profile.column_counts >= LEAST_COUNT
     rows, columns = (
-        weak & (counts >= options.threshold / 2 * profile.n)
+        weak & (counts >= options.threshold_so_far / 2 * profile.n)
         for weak, counts in zip(likely, (profile.row_counts, profile.column_counts), strict=True)
     )
     if not rows.any():
@@ -372,7 +374,9 @@ def _as_options(weight_threshold: float, normalizer: str, tolerance_percent: flo
     return Options(normalizer == "shorter", float(tolerance_percent), effort, float(weight_threshold))
 
 
-def _as_demonstrations(demonstrations: Demonstrations) -> tuple[list[str], list[Demonstration]]:
+def _as_demonstrations(
+    demonstrations: Demonstrations, *, at_least: str = "two"
+) -> tuple[list[str], list[Demonstration]]:
     if isinstance(demonstrations, Mapping):
         names, given = [str(name) for name in demonstrations], list(demonstrations.values())
     elif isinstance(demonstrations, EventChain | Observation):
@@ -381,7 +385,7 @@ def _as_demonstrations(demonstrations: Demonstrations) -> tuple[list[str], list[
         given = list(demonstrations)
         names = [str(i + 1) for i in range(len(given))]
     if not given:
-        raise ValueError("demonstrations: expected at least two, got none")
+        raise ValueError(f"demonstrations: expected at least {at_least}, got none")
     return names, given
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,11 @@ from sec_lab.files import UnusableFileError
 if TYPE_CHECKING:
     from sec_lab.action_model import ActionModel
     from sec_lab.event_chain import EventChain
+    from sec_lab.finding import OnlineFinder
     from sec_lab.observation import Observation
+    from sec_lab.pipeline import LabelledFrame
+    from sec_lab.recording import Recording
+    from sec_lab.relations import SegmentRelations
 
 
 def add_learning_commands(commands: Commands) -> None:
@@ -33,7 +38,11 @@ def add_learning_commands(commands: Commands) -> None:
         help="most typical first, or as they come",
     )
     learn.add_argument(
-        "--threshold", type=float, default=0.5, metavar="WEIGHT", help="least weight of rows and columns (default: 0.5)"
+        "--threshold",
+        type=float,
+        default=0.51,
+        metavar="WEIGHT",
+        help="least weight of rows and columns (default: 0.51, more than half of the demonstrations)",
     )
     add_similarity_options(learn)
     learn.set_defaults(run=_learn)
@@ -48,6 +57,9 @@ def add_learning_commands(commands: Commands) -> None:
     find.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="GraphML files that sec-lab learn wrote")
     find.add_argument("movie", type=Path, metavar="MOVIE", help="movie, folder of frames, or chain (GraphML or table)")
     find.add_argument("--right", type=Path, metavar="MOVIE", help="movie of the right eye")
+    find.add_argument(
+        "--side-by-side", action="store_true", help="left and right half of each picture are a stereo pair"
+    )
     find.add_argument("--depth", type=Path, metavar="FOLDER", help="folder of depth images")
     find.add_argument("--calibration", type=Path, metavar="FILE", help="calibration of the cameras")
     find.add_argument(
@@ -101,19 +113,9 @@ def _find(options: argparse.Namespace) -> int:
     from sec_lab.graphml import read_model
 
     models = {name: read_model(path) for name, path in zip(short_names(options.models), options.models, strict=True)}
-    movie = _seen(options)
     if options.online:
-        from sec_lab.observation import Observation
-
-        if not isinstance(movie, Observation):
-            raise ValueError(f"{options.movie}: expected a movie or an observation for --online, got a table")
-        finder = OnlineFinder(models, least_percent=options.least)
-        for graph, frame in zip(movie.recorded, movie.recorded.key_frames.tolist(), strict=True):
-            for found in finder.add(frame, graph):
-                what = "may have begun" if found.end is None else f"ends, began in frame {found.begin}"
-                say(f"frame {frame:>6}  {found.model} {what}  ({found.similarity_percent:.0f} %)")
-        return 0
-    found_actions = find_actions(models, movie, least_percent=options.least)
+        return _find_online(options, OnlineFinder(models, least_percent=options.least))
+    found_actions = find_actions(models, _seen(options), least_percent=options.least)
     wide = max(len(name) for name in models)
     for found in found_actions:
         end = "the end" if found.end is None else f"{found.end:>6}"
@@ -123,17 +125,62 @@ def _find(options: argparse.Namespace) -> int:
     return 0
 
 
+def _find_online(options: argparse.Namespace, finder: "OnlineFinder") -> int:
+    """Tell what is found as soon as the frame has been seen in which it begins or ends."""
+    from sec_lab.observation import Observation
+    from sec_lab.relations.over_time import steady_relations
+    from sec_lab.scene_graph import SceneGraph, scene_graph
+
+    def tell(frame: int, graph: SceneGraph) -> None:
+        for found in finder.add(frame, graph):
+            what = "may have begun" if found.end is None else f"ends, began in frame {found.begin}"
+            say(f"frame {frame:>6}  {found.model} {what}  ({found.similarity_percent:.0f} %)")
+            sys.stdout.flush()
+
+    def told(frames: Iterable["LabelledFrame"]) -> Iterator[tuple[int, "SegmentRelations"]]:
+        for number, relations in steady_relations(frames):
+            tell(number, scene_graph(relations))
+            yield number, relations
+
+    if _is_chain(options.movie):
+        movie = _seen(options)
+        if not isinstance(movie, Observation):
+            raise ValueError(f"{options.movie}: expected a movie or an observation for --online, got a table")
+        for graph, frame in zip(movie.recorded, movie.recorded.key_frames.tolist(), strict=True):
+            tell(frame, graph)
+    else:
+        from sec_lab.pipeline import observe
+
+        observe(_recording(options), over_time=told, progress=sys.stderr.isatty())
+    return 0
+
+
+def _is_chain(path: Path) -> bool:
+    return path.suffix.lower() in (".graphml", ".xml", ".dat")
+
+
 def _seen(options: argparse.Namespace) -> "EventChain | Observation":
-    cameras = options.right, options.depth, options.calibration
-    if options.movie.suffix.lower() in (".graphml", ".xml", ".dat"):
-        if any(cameras):
-            raise ValueError(f"{options.movie}: expected neither --right, --depth nor --calibration beside a chain")
+    if _is_chain(options.movie):
+        if any((options.right, options.side_by_side, options.depth, options.calibration)):
+            raise ValueError(
+                f"{options.movie}: expected neither --right, --side-by-side, --depth nor --calibration beside a chain"
+            )
         return _read(options.movie)
     from sec_lab.pipeline import observe
+
+    return observe(_recording(options), progress=sys.stderr.isatty())
+
+
+def _recording(options: argparse.Namespace) -> "Recording":
     from sec_lab.recording import Recording
 
-    recording = Recording.open(options.movie, right=options.right, depth=options.depth, calibration=options.calibration)
-    return observe(recording, progress=sys.stderr.isatty())
+    return Recording.open(
+        options.movie,
+        right=options.right,
+        depth=options.depth,
+        calibration=options.calibration,
+        stereo="side by side" if options.side_by_side else "none",
+    )
 
 
 def _read(path: Path) -> "EventChain | Observation":

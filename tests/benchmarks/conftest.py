@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.benchmarks import movies
+from tests.benchmarks import put_and_take as put_and_take_movies
 from tests.benchmarks.movies import Source
 
 
@@ -41,6 +42,15 @@ def sources(pytestconfig: pytest.Config) -> list[Source]:
     if not found:
         pytest.skip(f"{folder or movies.KEPT.relative_to(movies.ROOT)} holds no movies; --seeds 11 renders some")
     return found
+
+
+@pytest.fixture(scope="session")
+def put_and_take(pytestconfig: pytest.Config) -> dict[str, put_and_take_movies.Seen]:
+    """What is seen in movies of putting and taking, by their setting and seed; the kept chains without ``--seeds``."""
+    seeds, n_movies = (pytestconfig.getoption(name, None) for name in ("--seeds", "--movies"))
+    if not seeds:
+        return put_and_take_movies.kept()
+    return put_and_take_movies.of_seeds(seeds, n_movies, _teller(pytestconfig))
 
 
 def _teller(config: pytest.Config) -> Callable[[str], None]:

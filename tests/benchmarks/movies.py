@@ -87,20 +87,30 @@ def kept(folder: Path) -> list[Source]:
 
 def of_seed(seed: int, n_movies: int | None, tell: Callable[[str], None]) -> list[Source]:
     """Movies of a seed, rendered now unless they were before by the same generator."""
-    from sec_lab.worlds.tabletop.__main__ import main
     from sec_lab.worlds.tabletop.actions import ACTIONS, VERSIONS
     from sec_lab.worlds.tabletop.settings import SETTINGS
 
-    target = RENDERED / f"seed_{seed}_{generator_digest()}"
+    target = folder_of(seed)
     names = (f"{action}_{version}_{setting}" for action in ACTIONS for version in VERSIONS for setting in SETTINGS)
-    folders = in_order(target / name for name in names)[:n_movies]
+    folders = rendered(seed, in_order(target / name for name in names)[:n_movies], tell)
+    return [in_folder(folder, prefix=f"{seed}/") for folder in folders]
+
+
+def folder_of(seed: int) -> Path:
+    return RENDERED / f"seed_{seed}_{generator_digest()}"
+
+
+def rendered(seed: int, folders: list[Path], tell: Callable[[str], None]) -> list[Path]:
+    """Folders of movies of a seed, once all of them are there."""
+    from sec_lab.worlds.tabletop.__main__ import main
+
     for number, folder in enumerate(folders):
         if not is_complete(folder):
             tell(f"rendering {number + 1} of {len(folders)}: {folder.relative_to(ROOT)} (about a minute)")
             action, version, setting = folder.name.rsplit("_", 2)
             options = ["--action", action, "--version", version, "--setting", setting, "--seed", str(seed)]
-            assert main([str(target), *options]) == 0
-    return [in_folder(folder, prefix=f"{seed}/") for folder in folders]
+            assert main([str(folder.parent), *options]) == 0
+    return folders
 
 
 def generator_digest() -> str:

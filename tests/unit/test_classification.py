@@ -18,6 +18,7 @@ from sec_lab.classification import (
     confusion,
     correlation_features,
     leave_one_out,
+    most_classes,
     principal_dimensions,
     threshold_errors,
     type_similar,
@@ -25,6 +26,7 @@ from sec_lab.classification import (
     unsupervised_classes,
 )
 from sec_lab.event_chain import EventChain
+from sec_lab.xmeans import x_means
 
 Floats = NDArray[np.float64]
 TYPES = ["Moving Object", "Making Sandwich", "Filling Liquid", "Opening Book"]
@@ -169,6 +171,29 @@ def test_identical_manipulations_are_one_class() -> None:
     levels = np.array([[100.0, 30, 45], [30, 100, 20], [45, 20, 100]])
     table = np.kron(levels, np.ones((4, 4)))
     assert unsupervised_classes(table).tolist() == [0] * 4 + [1] * 4 + [2] * 4
+
+
+@pytest.mark.parametrize("n_types", [2, 3])
+def test_what_stands_aside_in_every_second_version_makes_no_class(n_types: int) -> None:
+    """Versions of a type that are nearly the same but for that leave the criterion of X-means no spread."""
+    types, aside = np.repeat(np.arange(n_types), 8), np.tile([0, 1], 4 * n_types)
+    same, alike = types[:, None] == types, aside[:, None] == aside
+    rng = np.random.default_rng(3)
+    table = np.where(same, np.where(alike, 98.0, 85.0), np.where(alike, 62.0, 55.0)) + rng.uniform(0, 2, same.shape)
+    table = np.triu(table, 1) + np.triu(table, 1).T + 100 * np.eye(len(types))
+    features = correlation_features(table)
+    without_limit = x_means(features, rng=np.random.default_rng(0), n_dimensions=principal_dimensions(features)).labels
+    assert without_limit.max() + 1 > n_types
+    assert unsupervised_classes(table).tolist() == types.tolist()
+
+
+def test_most_classes_are_what_the_correlations_span() -> None:
+    table, types = planted(n_types=5, n_versions=6, within=80, between=40, noise=2, seed=1)
+    eigenvalues = np.linalg.eigvalsh(np.corrcoef(table.T))
+    assert most_classes(table) == 1 + sum(value >= 0.7 for value in eigenvalues) == 5
+    assert unsupervised_classes(table).tolist() == types
+    # Who names a number means it.
+    assert unsupervised_classes(table, k_max=6).max() == 5
 
 
 def test_number_of_classes_can_be_limited() -> None:

@@ -1,13 +1,18 @@
 """``sec-lab learn`` and ``sec-lab find``."""
 
+import json
+import shutil
+
 import numpy as np
 import pytest
 
 import sec_lab as sl
+from sec_lab import recording
 from sec_lab.cli import main
 from sec_lab.graphml import read_model
 from sec_lab.observation import Observation
 from sec_lab.scene_graph import SceneGraph
+from sec_lab.worlds.drawn import moving_object
 
 PUTTING = {(1, 2): [0, 2, 2, 0], (2, 3): [0, 0, 2, 2]}
 
@@ -62,6 +67,33 @@ def test_find_says_when_an_action_begins_and_ends(chains, tmp_path, capsys):
     write_movie(tmp_path / "still.graphml", {(1, 2): [2, 0], (2, 3): [0, 0]})
     assert main(["find", str(file), str(tmp_path / "still.graphml")]) == 0
     assert capsys.readouterr().out == "nothing found\n"
+
+
+@pytest.mark.slow
+def test_find_in_a_stereo_movie(tmp_path, capsys):
+    """Two files or side by side: the same is found; online it is told in the frame in which it happens."""
+    left = moving_object(1).frames[::2, ::2, ::2]
+    right = np.roll(left, -4, axis=2)
+    for name, frames in (("left", left), ("right", right), ("both", np.concatenate([left, right], axis=2))):
+        recording.write_movie(tmp_path / f"{name}.mkv", frames, frames_per_second=25, lossless=True)
+    camera = {"focal_length_px": 200.0, "principal_point_px": [79.5, 63.5], "baseline_m": 0.1}
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    calibration = ["--calibration", str(tmp_path / "camera.json")]
+    pair = [str(tmp_path / "left.mkv"), "--right", str(tmp_path / "right.mkv"), *calibration]
+    one, two, model = (str(tmp_path / name) for name in ("one.graphml", "two.graphml", "moving.graphml"))
+    assert main(["observe", *pair, "-o", one]) == 0
+    shutil.copy(one, two)
+    assert main(["learn", one, two, "-o", model]) == 0
+    capsys.readouterr()
+    assert main(["find", model, *pair]) == 0
+    found = capsys.readouterr().out
+    assert found.startswith("moving  from frame")
+    assert main(["find", model, str(tmp_path / "both.mkv"), "--side-by-side", *calibration]) == 0
+    assert capsys.readouterr().out == found
+    assert main(["find", model, *pair, "--online"]) == 0
+    told = capsys.readouterr().out
+    assert main(["find", model, one, "--online"]) == 0
+    assert told == capsys.readouterr().out != ""
 
 
 @pytest.mark.parametrize(

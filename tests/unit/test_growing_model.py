@@ -31,7 +31,7 @@ def some_chains(draw: st.DrawFn) -> list[EventChain]:
 def test_counts_are_those_of_the_twin(chains: list[EventChain], threshold: float, shorter: bool) -> None:
     packed = Packed(chains, [str(i) for i in range(len(chains))])
     options = Options(shorter, 0.0, 1000, threshold)
-    one_by_one, twin = Profile(packed.codes_of(0), options), NaiveProfile(packed.codes_of(0), threshold)
+    one_by_one, twin = Profile(packed.codes_of(0), options), NaiveProfile(packed.codes_of(0), options.threshold_so_far)
     at_once = Profile(packed.codes_of(0), options)
     for i in range(1, len(chains)):
         alignment = one_by_one.align(packed.codes_of(i))

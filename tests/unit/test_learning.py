@@ -43,6 +43,15 @@ def test_weights_are_normalised_occurrences_and_what_is_rare_is_deleted():
     assert len(learn([without, without, without, whole]).row_weights) == 3
 
 
+def test_what_every_second_demonstration_has_is_not_common():
+    """Most have to have it; a threshold that is given is the least weight."""
+    whole = sl.EventChain([*PUTTING, [0, 2, 0, 2, 0, 2]], [*PAIRS, (1, 5)])
+    halves = [whole, sl.EventChain(PUTTING, PAIRS)] * 2
+    for mode in ("batch", "online"):
+        assert rows_of(learn(halves, mode=mode).chain) == sorted(map(tuple, PUTTING)), mode
+        assert sorted(learn(halves, mode=mode, weight_threshold=0.5).row_weights.tolist()) == [0.5, 1, 1, 1], mode
+
+
 @pytest.mark.parametrize("order", range(4))
 def test_a_row_that_only_the_most_typical_one_lacks_is_appended(order):
     whole = sl.EventChain([*PUTTING, [0, 2, 0, 2, 0, 2]], [*PAIRS, (1, 5)])
@@ -185,6 +194,12 @@ def test_a_threshold_that_leaves_nothing_is_refused():
     chains = [sl.EventChain([row], [(1, 2)]) for row in ([0, 2, 0], [9, 1, 9]) for _ in range(2)]
     with pytest.raises(ValueError, match=r"got 0.8, which leaves nothing \(largest weight of a row 0.50"):
         learn(chains, weight_threshold=0.8)
+
+
+@pytest.mark.parametrize(("n", "told"), [(0, "none"), (2, "2")])
+def test_types_are_found_among_three_at_least(n, told):
+    with pytest.raises(ValueError, match=f"demonstrations: expected at least three, got {told}"):
+        learn_types([GOOD] * n)
 
 
 def test_something_else_than_a_chain_is_refused():

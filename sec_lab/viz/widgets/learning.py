@@ -54,7 +54,7 @@ class LearningExplorer(Explorer):
         self.everything = widgets.Button(description="All", tooltip="learn from all demonstrations")
         self.nothing = widgets.Button(description="None", tooltip="learn from none")
         self.weight_threshold = widgets.FloatSlider(
-            value=weight_threshold, min=0, max=1, step=0.05, description="weight threshold (share)", style=LABELS,
+            value=weight_threshold, min=0, max=1, step=0.01, description="weight threshold (share)", style=LABELS,
             readout_format=".2f", layout=WIDE,
         )  # fmt: skip
         self.mode = widgets.ToggleButtons(options=list(get_args(Mode)), description="mode", style=TOGGLES, layout=INSET)
