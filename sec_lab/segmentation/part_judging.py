@@ -25,7 +25,7 @@ _ELSEWHERE, _COME_TO_LIGHT = 4.0, 2.0
 """Of a part away from its segment, by colour alone; and if the segment was hidden."""
 _LACKING = 2.5
 """By so much colours may fit worse if most of a segment is missing right here: it is in another light."""
-_CLEARLY = 2.0
+CLEARLY = 2.0
 """By so much another segment must fit worse for one to be known by colours that hardly fit."""
 _SURELY = 1.0
 """By so much colours must fit better where nothing but colour speaks for a segment."""
@@ -172,6 +172,8 @@ class Judge:
         if self._is_ground(part):
             return UNTAUGHT + 1
         best, least, fits = 0, np.inf, False
+        # A rim at the border that has been strange for long is what a hand has shifted there, not a hand that comes in.
+        enters = part.border and part.unknown_for < p.wait_frames
         asked = (part.around > _HARDLY_BESIDE) | (part.guess > _EXPECTED) | segments.close_to(part.box)
         # What was carried under a hand comes to light far from where it was last seen.
         asked |= segments.hidden & ~segments.mover
@@ -182,7 +184,7 @@ class Judge:
             lacking = bool(segments.missing[slot]) and part.around[slot] > _LARGELY_BESIDE
             fitting = part.colour[slot] < p.fitting_cost + (_LACKING if lacking else 0)
             near = part.around[slot] > _BESIDE or part.guess[slot] > _EXPECTED
-            grows = segments.mover[slot] and (fitting or part.border or segments.young(slot))
+            grows = segments.mover[slot] and (fitting or enters or segments.young(slot))
             if near and (grows or ((segments.moving[slot] or segments.missing[slot]) and fitting)):
                 score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
             elif part.colour[slot] < p.fitting_cost - _SURELY:
@@ -193,7 +195,7 @@ class Judge:
                 continue
             if score < least:
                 best, least, fits = int(slot), float(score), bool(fitting)
-        if not best and part.border:
+        if not best and enters:
             best = segments.mover_close_by(part.box)
         if best and (fits or part.border or segments.young(best)):
             segments.moving[best] = True
@@ -224,12 +226,12 @@ class Judge:
         bound = self.parameters.unknown_cost
         others = np.ones_like(segments.known)
         if segments.missing[slot] and part.around[slot] > _LARGELY_BESIDE:
-            bound += _CLEARLY
+            bound += CLEARLY
             others = part.around > _HARDLY_BESIDE
         elif not segments.hidden[slot]:
             return False
         others[slot] = False
-        fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - _CLEARLY)
+        fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - CLEARLY)
         return bool(fits and part.area < 1.2 * segments.most_px[slot])
 
     def _is_ground(self, part: Part) -> bool:

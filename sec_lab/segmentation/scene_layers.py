@@ -9,13 +9,16 @@ from sec_lab.segmentation.appearance import Lab, background_behind, smoothed_lab
 from sec_lab.segmentation.flow import dense_inverse_search, grey_flow, reduced_grey
 from sec_lab.segmentation.known_segments import KnownSegments, Slots
 from sec_lab.segmentation.layer_parameters import LayerParameters
-from sec_lab.segmentation.part_judging import UNTAUGHT, Judge, Part, parts_of, questions_about
+from sec_lab.segmentation.part_judging import CLEARLY, UNTAUGHT, Judge, Part, parts_of, questions_about
 
 _OFF_SHARE = 0.2
 """Share of the largest area of a segment that must come to light below it to be a thing of its own."""
 
 _STILL_FRAMES = 2
 """Pixels that are still for so long belong to it, too."""
+
+_RIM_PX = 3
+"""How far pixels of mixed colours may lie from a segment: the blur of a camera and of compression."""
 
 
 class Layers:
@@ -85,7 +88,8 @@ class Layers:
             found, relaxed = relaxed, found
         slots = found.copy()
         self._judge(slots, taught, predicted, lab, bins)
-        self._part_off(slots, taught, costs[0])
+        self._part_off(slots, taught, costs[0], bins)
+        _part_kernels.close_rims(slots, self.rest, costs, segments.moving, np.float32(p.unknown_cost), _RIM_PX, taught)
         movers_there = segments.mover[slots].any()
         if not movers_there:
             self._visit = segments.n_steps
@@ -245,7 +249,9 @@ class Layers:
                 new[at] = UNTAUGHT + judge.absorbing(part)
         _part_kernels.recolour(parts.where, new, slots, taught)
 
-    def _part_off(self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32]) -> None:
+    def _part_off(
+        self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32], bins: NDArray[np.uint16]
+    ) -> None:
         """Make a segment of what lay below another one that was lifted off it: two things, taken for one so far."""
         import cv2
 
@@ -274,10 +280,31 @@ class Layers:
                 continue
             around = slots[(cv2.dilate(where.view(np.uint8), square) > 0) & ~where]
             beside = np.flatnonzero(np.bincount(around, minlength=256) > 0)
-            fresh = [k for k in beside if segments.parted_off[k]]
+            fresh = [k for k in beside if segments.parted_off[k]] or self._of_one_hue(bins[where], slot, beside)
             left, top, width, height = boxes[part, : cv2.CC_STAT_AREA]
             box = np.array([top, left, top + height - 1, left + width - 1], dtype=np.int64)
             new = fresh[0] if fresh else segments.new(box, self.slots, self.rest, mover=False)
             segments.parted_off[new] = new > 1
             slots[where] = new
             taught[where] = 1
+
+    def _of_one_hue(self, bins: NDArray[np.uint16], slot: int, beside: NDArray[np.intp]) -> list[int]:
+        """The segment of whose hue a part is, in any light, that comes to light from below another one; none or one.
+
+        It is one that is beside the part, or one that was carried there, if nothing else is nearly so like it.
+        """
+        from sec_lab.segmentation._layer_kernels import N_LIGHTNESS
+
+        segments = self._segments
+        known = [int(k) for k in np.flatnonzero(segments.known & ~segments.mover) if k > 1]
+        hue = bins % (segments.tables.shape[1] // N_LIGHTNESS)
+        cost = {k: float(segments.tables[k].reshape(N_LIGHTNESS, -1).min(axis=0)[hue].mean()) for k in known}
+        others = [k for k in known if k != slot]
+        best = min(others, key=cost.__getitem__, default=slot)
+        if best == slot or cost[best] >= cost.get(slot, np.inf) - CLEARLY:
+            return []
+        if best in beside and cost[best] < self._p.fitting_cost:
+            return [best]
+        alone = all(cost[best] < cost[k] - CLEARLY for k in others if k != best)
+        carried = bool(segments.moving[best] or segments.hidden[best])
+        return [best] if alone and carried and cost[best] < self._p.unknown_cost else []

@@ -20,6 +20,10 @@ _RISES = 3.0
 _STRANGE = 2.0
 _JUMP = 6.0
 _SURROUNDED = 0.8
+_SOLID = 0.85
+_OTHER_HUE, _SAME_HUE = 25.0, 5.0
+_BRIGHTER = 10.0
+_AT_BORDER = 0.15
 MAX_OBJECTS = 100
 
 
@@ -57,7 +61,7 @@ def static_segments(
     domains = superparamagnetic_clustering(image, parameters=PottsParameters(minimum_size_px=max(10, least_px)))
     if rise is not None:
         whole = _with_things_on_top(bins, domains, whole, rise, least_px)
-    return _coloured(bins, domains, whole, least_px)
+    return _coloured(lab, bins, domains, whole, least_px)
 
 
 def rise_above_plane(depth_m: NDArray[np.float32]) -> Floats:
@@ -412,8 +416,13 @@ def _is_surrounded(piece: NDArray[np.bool_], region: NDArray[np.bool_]) -> bool:
     return bool(region[around].mean() > _SURROUNDED)
 
 
-def _coloured(bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Labels, least_px: int) -> Labels:
-    """Regions with a large part of another colour in two: what a cup holds. Rims and bands stay."""
+def _coloured(
+    lab: NDArray[np.uint8], bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Labels, least_px: int
+) -> Labels:
+    """Regions with a part of another colour in two: what a cup holds, the pages of a closed book. Rims and bands stay.
+
+    Part is what is large and thick, or, however small, of one piece and of another hue, which no shadow makes.
+    """
     import cv2
 
     parted = labels.copy()
@@ -421,7 +430,7 @@ def _coloured(bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Lab
     for slot in np.unique(labels[labels > BACKGROUND]):
         region = labels == slot
         area = int(region.sum())
-        least = max(1.5 * least_px, 0.12 * area)
+        least = 1.5 * least_px
         sizes = np.bincount(domains[region])
         for domain in np.flatnonzero(sizes >= least):
             if number >= MAX_OBJECTS:
@@ -432,8 +441,17 @@ def _coloured(bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Lab
             if n < 2 or rest.sum() < least:
                 continue
             piece = pieces == 1 + int(np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
-            if not least <= piece.sum() <= 0.6 * area or not _is_thick(piece) or not _differ(bins, piece, rest):
+            if not least <= piece.sum() <= 0.6 * area:
                 continue
+            large = piece.sum() >= 0.12 * area and _is_thick(piece) and _differ(bins, piece, rest)
+            if not large:
+                if _hue_distance(lab, piece, rest) < _OTHER_HUE or not _differ(bins, piece, rest, by=2.5):
+                    continue
+                if _is_ground(lab, piece, labels):
+                    parted[piece] = BACKGROUND
+                    continue
+                if not _is_solid(piece):
+                    continue
             number += 1
             parted[piece] = number
     return parted
@@ -445,3 +463,29 @@ def _is_thick(part: NDArray[np.bool_]) -> bool:
 
     thickness = float(cv2.distanceTransform(np.pad(part, 1).astype(np.uint8), cv2.DIST_L2, 5).max())
     return thickness > 0.6 * float(np.sqrt(part.sum() / np.pi))
+
+
+def _is_solid(part: NDArray[np.bool_]) -> bool:
+    """Whether a part fills its convex hull, which no rim and no writing does."""
+    import cv2
+
+    outlines, _ = cv2.findContours(part.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return bool(part.sum() >= _SOLID * cv2.contourArea(cv2.convexHull(np.concatenate(outlines))))
+
+
+def _is_ground(lab: NDArray[np.uint8], piece: NDArray[np.bool_], labels: Labels) -> bool:
+    """Whether a piece at the border of a region is the background around, lit as it is or in a shade."""
+    import cv2
+
+    around = (cv2.dilate(piece.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0) & ~piece
+    if (labels[around] == BACKGROUND).mean() < _AT_BORDER:
+        return False
+    near = (cv2.dilate(piece.astype(np.uint8), np.ones((31, 31), np.uint8)) > 0) & (labels == BACKGROUND)
+    brighter = float(np.median(lab[piece][:, 0])) - float(np.median(lab[near][:, 0]))
+    return brighter < _BRIGHTER and _hue_distance(lab, piece, near) < _SAME_HUE
+
+
+def _hue_distance(lab: NDArray[np.uint8], one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+    """How far two parts differ in chroma, whatever light falls on them."""
+    chroma = [np.median(lab[where][:, 1:].astype(np.float32), axis=0) for where in (one, other)]
+    return float(np.hypot(*(chroma[0] - chroma[1])))
