@@ -325,7 +325,7 @@ def close_rims(
             for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
                 one, far = _first(slots, y, x, dy, dx, reach)
                 other, away = _first(slots, y, x, -dy, -dx, reach)
-                if one == BACKGROUND or other == BACKGROUND or one == other or not (moving[one] or moving[other]):
+                if one in (BACKGROUND, other) or other == BACKGROUND or not (moving[one] or moving[other]):
                     continue
                 if min(far, away) < nearest:
                     nearest = min(far, away)
