@@ -24,6 +24,7 @@ _SOLID = 0.85
 _OTHER_HUE, _SAME_HUE = 25.0, 5.0
 _BRIGHTER = 10.0
 _AT_BORDER = 0.15
+_A_SIDE = 0.1
 MAX_OBJECTS = 100
 
 
@@ -450,7 +451,7 @@ def _coloured(
                 if _is_ground(lab, piece, labels):
                     parted[piece] = BACKGROUND
                     continue
-                if not _is_solid(piece):
+                if not _is_solid(piece) or _is_band(piece, region):
                     continue
             number += 1
             parted[piece] = number
@@ -471,6 +472,17 @@ def _is_solid(part: NDArray[np.bool_]) -> bool:
 
     outlines, _ = cv2.findContours(part.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return bool(part.sum() >= _SOLID * cv2.contourArea(cv2.convexHull(np.concatenate(outlines))))
+
+
+def _is_band(piece: NDArray[np.bool_], region: NDArray[np.bool_]) -> bool:
+    """Whether a piece runs across a region, with much of it on either side."""
+    import cv2
+
+    # A region reaches a few pixels beyond the thing that it is of, on both ends of a band.
+    cut = cv2.dilate(piece.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    n, _, statistics, _ = cv2.connectedComponentsWithStats((region & ~cut).astype(np.uint8), connectivity=4)
+    sides = np.sort(statistics[1:n, cv2.CC_STAT_AREA])[::-1]
+    return len(sides) > 1 and bool(sides[1] >= _A_SIDE * region.sum())
 
 
 def _is_ground(lab: NDArray[np.uint8], piece: NDArray[np.bool_], labels: Labels) -> bool:
