@@ -346,5 +346,5 @@ def _first(slots: Slots, y: int, x: int, dy: int, dx: int, reach: int) -> tuple[
         if v < 0 or u < 0 or v >= height or u >= width:
             break
         if slots[v, u] > BACKGROUND:
-            return np.int64(slots[v, u]), k
-    return np.int64(BACKGROUND), reach + 1
+            return int(slots[v, u]), k
+    return BACKGROUND, reach + 1
