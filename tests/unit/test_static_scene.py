@@ -123,3 +123,40 @@ class TestThingsOnThings:
         """It rises and has its own colour, but lies at the border of its region."""
         found, _ = self.segments(RED, 9, place=(33, 60))
         assert set(np.unique(found)) == {1, 2}
+
+
+class TestPartsOfAnotherHue:
+    """A red thing with something white in it, as pages or milk."""
+
+    WHITE = (228, 224, 210)
+
+    def segments(self, part: Block, *, lower: float = 0, around: Sequence[Block] = ()) -> tuple[Any, Any]:
+        """``lower``: how far the part lies below the thing, in units of the noise of depth."""
+        rng = np.random.default_rng(3)
+        picture, truth = drawn(
+            Moment([Block((48, 60), RED, 52, 52), part, *around]), rng.normal(0, 2, (HEIGHT, WIDTH, 3))
+        )
+        inverse = 1 / plane() + rng.normal(0, 0.01, (HEIGHT, WIDTH))
+        inverse += 0.12 * (truth == 1) + (0.12 - 0.01 * lower) * (truth == 2)
+        return static_segments(picture, depth_m=(1 / inverse).astype(np.float32)), truth
+
+    def test_the_pages_of_a_closed_book_are_a_part(self) -> None:
+        found, truth = self.segments(Block((66, 60), self.WHITE, 8, 46))
+        pages, cover = found[66, 60], found[40, 60]
+        assert len({int(pages), int(cover), 1}) == 3
+        assert ((found == pages) & (truth == 2)).sum() > 0.75 * (truth == 2).sum()
+
+    def test_a_band_that_runs_across_is_none(self) -> None:
+        found, _ = self.segments(Block((48, 60), self.WHITE, 9, 52))
+        assert set(np.unique(found)) == {1, 2}
+
+    @pytest.mark.parametrize(("lower", "parts"), [(6, {1, 2, 3}), (0, {1, 2})])
+    def test_what_a_cup_holds_lies_lower_than_its_rim_and_a_painted_mark_does_not(
+        self, lower: float, parts: set[int]
+    ) -> None:
+        found, _ = self.segments(Block((48, 60), self.WHITE, 16, 18), lower=lower)
+        assert set(np.unique(found)) == parts
+
+    def test_a_shade_of_the_same_hue_is_no_part(self) -> None:
+        found, _ = self.segments(Block((66, 60), (110, 26, 24), 8, 46))
+        assert set(np.unique(found)) == {1, 2}
