@@ -1,11 +1,12 @@
 """Which segment a part of the picture belongs to that is small, unknown or left behind (``layers.py``)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sec_lab.segmentation.known_segments import N_SLOTS, KnownSegments, Slots
+from sec_lab.segmentation.known_segments import CLEARLY, N_SLOTS, KnownSegments, Slots
 from sec_lab.segmentation.layer_parameters import LayerParameters
 
 UNTAUGHT = 256
@@ -25,8 +26,6 @@ _ELSEWHERE, _COME_TO_LIGHT = 4.0, 2.0
 """Of a part away from its segment, by colour alone; and if the segment was hidden."""
 _LACKING = 2.5
 """By so much colours may fit worse if most of a segment is missing right here: it is in another light."""
-CLEARLY = 2.0
-"""By so much another segment must fit worse for one to be known by colours that hardly fit."""
 _SURELY = 1.0
 """By so much colours must fit better where nothing but colour speaks for a segment."""
 
@@ -87,7 +86,10 @@ class Questions:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part in question and what is around it; the arrays have an entry for every slot."""
+    """A part in question and what is around it; the arrays have an entry for every slot.
+
+    ``colours`` gives the bins of its pixels.
+    """
 
     slot: int
     area: int
@@ -100,6 +102,7 @@ class Part:
     below: NDArray[np.float32]
     colour: NDArray[np.float32]
     fits: NDArray[np.float32]
+    colours: Callable[[], NDArray[np.uint16]]
 
 
 def parts_of(slots: Slots, unknown_for: Slots, resting_for: Slots) -> Parts:
@@ -243,6 +246,11 @@ class Judge:
         fresh = (self.segments.born > self.visit) & ~self.segments.mover & self.segments.known & (part.around > _BESIDE)
         if fresh.any():
             return int(np.argmax(np.where(fresh, part.around, 0)))
+        lifted = self.segments.moving & ~self.segments.mover
+        if part.below[lifted].sum() > 0.5:
+            below = int(np.argmax(np.where(lifted, part.below, 0)))
+            for slot in self.segments.of_one_hue(part.colours(), below, np.flatnonzero(part.around > _HARDLY_BESIDE)):
+                return slot
         hand = float(part.around[self.segments.mover].sum())
         large = part.area >= self.new_px and part.thick
         if large and (hand < 0.3 or part.area >= 4 * self.new_px):

@@ -1,5 +1,6 @@
 """The layers of a scene as a movie goes on: what rests, what lies behind it, what moves (see ``layers.py``)."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from sec_lab.segmentation.appearance import Lab, background_behind, smoothed_lab
 from sec_lab.segmentation.flow import dense_inverse_search, grey_flow, reduced_grey
 from sec_lab.segmentation.known_segments import KnownSegments, Slots
 from sec_lab.segmentation.layer_parameters import LayerParameters
-from sec_lab.segmentation.part_judging import CLEARLY, UNTAUGHT, Judge, Part, parts_of, questions_about
+from sec_lab.segmentation.part_judging import UNTAUGHT, Judge, Part, Parts, parts_of, questions_about
 
 _OFF_SHARE = 0.2
 """Share of the largest area of a segment that must come to light below it to be a thing of its own."""
@@ -230,6 +231,7 @@ class Layers:
                 below[k],
                 colour[k],
                 fits[k],
+                partial(_colours_of, bins, parts, at),
             )
             if questions.left[at]:
                 # What has the mover's own colours stays with it as long as it is there.
@@ -280,7 +282,7 @@ class Layers:
                 continue
             around = slots[(cv2.dilate(where.view(np.uint8), square) > 0) & ~where]
             beside = np.flatnonzero(np.bincount(around, minlength=256) > 0)
-            fresh = [k for k in beside if segments.parted_off[k]] or self._of_one_hue(bins[where], slot, beside)
+            fresh = [k for k in beside if segments.parted_off[k]] or segments.of_one_hue(bins[where], slot, beside)
             left, top, width, height = boxes[part, : cv2.CC_STAT_AREA]
             box = np.array([top, left, top + height - 1, left + width - 1], dtype=np.int64)
             new = fresh[0] if fresh else segments.new(box, self.slots, self.rest, mover=False)
@@ -288,23 +290,9 @@ class Layers:
             slots[where] = new
             taught[where] = 1
 
-    def _of_one_hue(self, bins: NDArray[np.uint16], slot: int, beside: NDArray[np.intp]) -> list[int]:
-        """The segment of whose hue a part is, in any light, that comes to light from below another one; none or one.
 
-        It is one that is beside the part, or one that was carried there, if nothing else is nearly so like it.
-        """
-        from sec_lab.segmentation._layer_kernels import N_LIGHTNESS
-
-        segments = self._segments
-        known = [int(k) for k in np.flatnonzero(segments.known & ~segments.mover) if k > 1]
-        hue = bins % (segments.tables.shape[1] // N_LIGHTNESS)
-        cost = {k: float(segments.tables[k].reshape(N_LIGHTNESS, -1).min(axis=0)[hue].mean()) for k in known}
-        others = [k for k in known if k != slot]
-        best = min(others, key=cost.__getitem__, default=slot)
-        if best == slot or cost[best] >= cost.get(slot, np.inf) - CLEARLY:
-            return []
-        if best in beside and cost[best] < self._p.fitting_cost:
-            return [best]
-        alone = all(cost[best] < cost[k] - CLEARLY for k in others if k != best)
-        carried = bool(segments.moving[best] or segments.hidden[best])
-        return [best] if alone and carried and cost[best] < self._p.unknown_cost else []
+def _colours_of(bins: NDArray[np.uint16], parts: Parts, at: int) -> NDArray[np.uint16]:
+    """Bins of the pixels of a part."""
+    top, left, bottom, right = parts.box[at]
+    box = np.s_[top : bottom + 1, left : right + 1]
+    return np.asarray(bins[box][parts.where[box] == at])

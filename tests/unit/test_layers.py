@@ -204,13 +204,14 @@ class TestLid:
 
 
 class TestBook:
-    """A red book of whose pages a white strip is to be seen, until a hand takes the upper cover off them."""
+    """A red book of whose pages a strip is to be seen, in the shade, until a hand takes the upper cover off them."""
 
     LOWER, PAGES = Block((50, 30), RED, 52, 46), Block((49, 30), (228, 224, 210), 42, 38)
+    SIDE = Block((67, 30), (160, 157, 147), 7, 38)
 
     def test_what_comes_to_light_below_the_cover_is_of_the_pages(self) -> None:
         def moment(place: Place, hand: Place | None = None) -> Moment:
-            return Moment((self.LOWER, self.PAGES, Block(place, RED, 36, 46)), hand)
+            return Moment((self.LOWER, self.PAGES, self.SIDE, Block(place, RED, 36, 46)), hand)
 
         closed, aside = (46.0, 30.0), (46.0, 80.0)
         movie = Movie(
@@ -223,8 +224,8 @@ class TestBook:
             ]
         )
         assert movie.seen(0) == {1, 2, 3}
-        pages = movie.label(0, 2)
-        assert pages != movie.label(0, 3)
+        pages = movie.label(0, 3)
+        assert pages != movie.label(0, 4)
         assert movie.label(-1, 2) == pages
 
 
