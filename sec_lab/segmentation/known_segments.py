@@ -207,7 +207,7 @@ class KnownSegments:
         best = int(np.argmax(fitting))
         return best if fitting[best] > 0.4 else 0
 
-    def of_one_hue(self, colours: NDArray[np.uint16], slot: int, beside: NDArray[np.intp]) -> list[int]:
+    def of_one_hue(self, colours: NDArray[np.uint16], slot: int, beside: NDArray[Any]) -> list[int]:
         """The segment of whose hue a part is, in any light, that comes to light from below another one; none or one.
 
         It is one that is beside the part, or one that was carried there, if nothing else is nearly so like it.

@@ -271,7 +271,7 @@ class Layers:
         )
         if n < self._new_px:
             return
-        square = np.ones((3, 3), np.uint8)
+        square, rims = (np.ones((2 * px + 1, 2 * px + 1), np.uint8) for px in (1, _RIM_PX))
         below = cv2.morphologyEx((still >= _STILL_FRAMES).astype(np.uint8), cv2.MORPH_OPEN, square)
         n_parts, parts, boxes, _ = cv2.connectedComponentsWithStats(below, connectivity=4)
         for part in range(1, n_parts):
@@ -280,9 +280,10 @@ class Layers:
             least = max(self._new_px, _OFF_SHARE * segments.most_px[slot])
             if (still[where] >= wait).sum() < least:
                 continue
-            around = slots[(cv2.dilate(where.view(np.uint8), square) > 0) & ~where]
-            beside = np.flatnonzero(np.bincount(around, minlength=256) > 0)
-            fresh = [k for k in beside if segments.parted_off[k]] or segments.of_one_hue(bins[where], slot, beside)
+            beside, near = (
+                np.unique(slots[(cv2.dilate(where.view(np.uint8), reach) > 0) & ~where]) for reach in (square, rims)
+            )
+            fresh = [k for k in beside if segments.parted_off[k]] or segments.of_one_hue(bins[where], slot, near)
             left, top, width, height = boxes[part, : cv2.CC_STAT_AREA]
             box = np.array([top, left, top + height - 1, left + width - 1], dtype=np.int64)
             new = fresh[0] if fresh else segments.new(box, self.slots, self.rest, mover=False)
