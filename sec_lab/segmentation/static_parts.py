@@ -12,6 +12,7 @@ RISES = 3.0
 """Height that is more than noise, in units of the noise of depth."""
 
 _SURROUNDED = 0.8
+_NARROW = 3
 _SOLID = 0.85
 _OTHER_HUE, _SAME_HUE = 25.0, 5.0
 _BRIGHTER = 10.0
@@ -59,7 +60,13 @@ def parted_at_necks(bins: NDArray[np.uint16], labels: Labels, least_px: int) -> 
             if len(large) < 2:
                 continue
             large.sort(key=lambda k: -int(statistics[k, cv2.CC_STAT_AREA]))
-            other = next((k for k in large[1:] if _differ(bins, cores == large[0], cores == k)), None)
+            other = None
+            for k in large[1:]:
+                # The narrower the neck is against both, the less their colours have to say.
+                narrow = min(depth[cores == core].max() for core in (large[0], k)) >= _NARROW * radius
+                if _differ(bins, cores == large[0], cores == k, by=1.5 if narrow else 3.0):
+                    other = k
+                    break
             if other is None:
                 continue
             far = [cv2.distanceTransform((cores != k).astype(np.uint8), cv2.DIST_L2, 5) for k in (large[0], other)]

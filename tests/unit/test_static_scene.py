@@ -80,6 +80,19 @@ class TestStaticSegments:
         assert len(np.unique(red)) == len(np.unique(blue)) == 1
         assert red[0, 0] != blue[0, 0]
 
+    def test_two_things_with_middles_of_one_colour_joined_by_a_narrow_neck(self) -> None:
+        white = (228, 224, 210)
+        found = self.segments(
+            [
+                *(Block((50, column), colour, 30, 30) for column, colour in ((34, RED), (80, BLUE))),
+                *(Block((50, column), white, 20, 20) for column in (34, 80)),
+                Block((50, 53), RED, 7, 10),
+                Block((50, 61), BLUE, 7, 10),
+            ]
+        )
+        assert found[50, 34] != found[50, 80]
+        assert min(found[50, 34], found[50, 80]) > 1
+
     def test_one_thing_with_a_neck_stays_one(self) -> None:
         found = self.segments([Block((50, 34), RED, 24, 24), Block((50, 76), RED, 24, 24), Block((50, 55), RED, 8, 24)])
         assert set(np.unique(found)) == {1, 2}
