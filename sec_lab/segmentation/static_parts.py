@@ -13,7 +13,7 @@ RISES = 3.0
 
 _SURROUNDED = 0.8
 _NARROW = 3
-_SOLID = 0.85
+_SOLID = 0.8
 _OTHER_HUE, _SAME_HUE = 25.0, 5.0
 _BRIGHTER = 10.0
 _AT_BORDER = 0.15
@@ -210,7 +210,7 @@ def with_coloured_parts(
                 continue
             large = piece.sum() >= 0.12 * area and _is_thick(piece) and _differ(bins, piece, rest)
             if not large:
-                if _hue_distance(lab, piece, rest) < _OTHER_HUE or not _differ(bins, piece, rest, by=2.5):
+                if _hue_distance(lab, piece, rest) < _OTHER_HUE or not _differ(bins, piece, rest, by=1.5):
                     continue
                 if _is_ground(lab, piece, labels):
                     parted[piece] = BACKGROUND
