@@ -274,3 +274,32 @@ def naive_presence(
                 if 0 <= y2 < slots.shape[0] and 0 <= x2 < slots.shape[1] and mover[slots[y2, x2]]:
                     touched[slot] = True
     return counts, touched, boxes
+
+
+def naive_rims(
+    slots: Image, rest: Image, costs: NDArray[np.float32], moving: NDArray[np.bool_], bound: float, reach: int
+) -> Image:
+    """Slots after strange pixels of the background between two segments went to the nearer one, pixel by pixel."""
+    closed = slots.copy()
+    height, width = slots.shape
+    for y, x in np.argwhere(slots == 1):
+        if costs[0 if rest[y, x] == 1 else 1, y, x] < bound:
+            continue
+        nearest = reach + 1
+        for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            ends = []
+            for sign in (1, -1):
+                places = [(y + sign * k * dy, x + sign * k * dx) for k in range(1, reach + 1)]
+                seen = [
+                    (k, int(slots[place]))
+                    for k, place in enumerate(places, start=1)
+                    if 0 <= place[0] < height and 0 <= place[1] < width and slots[place] > 1
+                ]
+                ends.append(seen[0] if seen else None)
+            if None in ends:
+                continue
+            (far, one), (away, other) = ends
+            if one != other and (moving[one] or moving[other]) and min(far, away) < nearest:
+                nearest = min(far, away)
+                closed[y, x] = one if far <= away else other
+    return closed

@@ -21,6 +21,7 @@ class _Segment:
     node: bool = False
     leaves: bool = False
     rests: int = 0
+    has_moved: bool = False
 
 
 @dataclass
@@ -55,7 +56,7 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
         area = {label: len(pixels) for label, pixels in places.items()}
         centre = {label: _centre(pixels) for label, pixels in places.items()}
         rests = {label: label not in moving[now] for label in places}
-        away, covered, hidden = {}, {}, {}
+        away, covered, hidden, pauses = {}, {}, {}, {}
         for label in sorted(places):
             segment = segments.setdefault(label, _Segment(now, centre[label]))
             segment.largest = max(segment.largest, area[label])
@@ -70,8 +71,11 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
             )
             segment.leaves = at_border and not rests[label] and area[label] <= p.leaving_share * segment.largest
             segment.rests = segment.rests + 1 if rests[label] else 0
+            segment.has_moved = segment.has_moved or not rests[label]
+            short = rests[label] and segment.rests < p.pause_frames
+            pauses[label] = at_border and segment.has_moved and short
         touching = {pair: _touching(hints, pair) for pair in combinations(sorted(places), 2)}
-        sure = {pair: not (hidden[pair[0]] or hidden[pair[1]]) for pair in touching}
+        sure = {(i, j): not (hidden[i] or hidden[j]) and pauses[i] == pauses[j] for i, j in touching}
         counted = dict(touching)
         if p.contact_by_motion:
             counted.update({pair: 0.0 for pair in touching if rests[pair[0]] != rests[pair[1]]})

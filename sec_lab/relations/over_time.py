@@ -140,6 +140,8 @@ class _State:
             ("owner", (n,), np.int64),
             ("table", (n, 6), np.int64),
             ("largest", (n,), np.int64),
+            ("still", (n,), np.int64),
+            ("has_moved", (n,), np.bool_),
             ("place", (n, 2), np.float64),
             ("rest_place", (n, 2), np.float64),
             ("pairs", (n, n, 9), np.int64),
@@ -157,6 +159,8 @@ class _State:
     owner: NDArray[np.int64]
     table: NDArray[np.int64]
     largest: NDArray[np.int64]
+    still: NDArray[np.int64]
+    has_moved: NDArray[np.bool_]
     place: NDArray[np.float64]
     rest_place: NDArray[np.float64]
     pairs: NDArray[np.int64]
@@ -184,7 +188,8 @@ class _State:
         self.active[slot] = True
         self.table[slot] = 0
         self.table[slot, FIRST] = self.now
-        self.largest[slot] = 0
+        self.largest[slot] = self.still[slot] = 0
+        self.has_moved[slot] = False
         for pairs in (self.pairs[slot], self.pairs[:, slot]):
             pairs[...] = 0
             pairs[:, STATE] = UNDECIDED
@@ -212,12 +217,18 @@ class _State:
         away = (from_place**2).sum(axis=1) * np.pi > self.largest[slots]
 
         known = frame.moving is not None or p.rest_px is not None
+        measured = frame.moving is not None or len(self._images) > 0
         if frame.moving is not None:
             rests = ~np.isin(seen.labels, list(frame.moving))
         elif p.rest_px is not None:
             rests = self._measured(codes, width, seen, slots, away, p.rest_px)
         else:
             rests = np.zeros(len(slots), np.bool_)
+        pauses = np.zeros(len(slots), np.bool_)
+        if known:
+            self.still[slots] = np.where(rests, self.still[slots] + 1, 0)
+            self.has_moved[slots] |= ~rests & measured
+            pauses = rests & seen.at_border & self.has_moved[slots] & (self.still[slots] < p.pause_frames)
         covered = (seen.hints[:, ~rests] > 0).any(axis=1) & known
         calm = rests & ~covered
         self.rest_place[slots[calm]] = seen.centres[calm]
@@ -225,6 +236,7 @@ class _State:
         touching, sure = seen.touching, seen.sure
         hidden = seen.pixels < p.visible_share * self.largest[slots]
         sure &= ~(hidden[:, None] | hidden)
+        sure &= ~(pauses[:, None] ^ pauses)
         if known and p.contact_by_motion:
             touching = np.where(rests[:, None] != rests, 0.0, touching)
         if known and p.carried:

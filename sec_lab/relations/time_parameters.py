@@ -7,7 +7,14 @@ import numpy as np
 from sec_lab.relations.depth import CONTACT_STEP_M, SKIP_PX
 
 _TUNED_AT_FPS = 25.0
-_IN_FRAMES = ("hysteresis_frames", "together_frames", "hold_frames", "min_life_frames", "motion_frames")
+_IN_FRAMES = (
+    "hysteresis_frames",
+    "together_frames",
+    "hold_frames",
+    "min_life_frames",
+    "motion_frames",
+    "pause_frames",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +56,10 @@ class TimeParameters:
         tremble by a pixel stay below. A bar that comes straight in from the border of the picture hardly moves its
         sides and may seem to rest; a hand with fingers does not. None: motion is not measured, and without it the four
         rules below are off unless motion is given with the frames.
+    pause_frames : int
+        What reaches in from the border of the picture and has moved only pauses when it stands still for less than so
+        many frames, and a pause changes no contact with what rests: an arm that pours does not come to lie on the table
+        below. 0: off.
     freeze : bool
         Two segments that both rest, the smaller one next to something that moves and may hide it, keep their relation.
         Off by default: it keeps wrong relations as well, until the hand has gone, and what it is good for the next rule
@@ -88,6 +99,7 @@ class TimeParameters:
     min_life_frames: int = 12
     motion_frames: int = 8
     rest_px: float | None = 1.3
+    pause_frames: int = 50
     freeze: bool = False
     contact_by_motion: bool = True
     carried: bool = True
@@ -123,6 +135,7 @@ PICTURE_ALONE = TimeParameters(
     leaving_share=1.0,
     min_life_frames=1,
     rest_px=None,
+    pause_frames=0,
 )
 """All rules off: the relations of every single picture as :func:`~sec_lab.relations.scan_line_relations` finds them."""
 

@@ -299,3 +299,52 @@ def uncovered(
                 still[y, x] = min(resting_for[y, x], wait_frames)
                 n += resting_for[y, x] >= wait_frames
     return n
+
+
+@nb.njit(cache=True, nogil=True)
+def close_rims(
+    slots: Slots,
+    rest: Slots,
+    costs: Floats,
+    moving: NDArray[np.bool_],
+    bound: np.float32,
+    reach: int,
+    taught: NDArray[np.uint8],
+) -> None:
+    """Give mixed pixels between two segments, one of them moving, to the nearer one.
+
+    They are those labelled as background, for which they look too strange, with the two on opposite sides.
+    """
+    height, width = slots.shape
+    given = np.zeros((height, width), np.uint8)
+    for y in range(height):
+        for x in range(width):
+            if slots[y, x] != BACKGROUND or costs[0 if rest[y, x] == BACKGROUND else 1, y, x] < bound:
+                continue
+            nearest = reach + 1
+            for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+                one, far = _first(slots, y, x, dy, dx, reach)
+                other, away = _first(slots, y, x, -dy, -dx, reach)
+                if one in (BACKGROUND, other) or other == BACKGROUND or not (moving[one] or moving[other]):
+                    continue
+                if min(far, away) < nearest:
+                    nearest = min(far, away)
+                    given[y, x] = one if far <= away else other
+    for y in range(height):
+        for x in range(width):
+            if given[y, x]:
+                slots[y, x] = given[y, x]
+                taught[y, x] = 0
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _first(slots: Slots, y: int, x: int, dy: int, dx: int, reach: int) -> tuple[int, int]:
+    """The first segment in a direction that is not the background, and its distance; the background if none is near."""
+    height, width = slots.shape
+    for k in range(1, reach + 1):
+        v, u = y + k * dy, x + k * dx
+        if v < 0 or u < 0 or v >= height or u >= width:
+            break
+        if slots[v, u] > BACKGROUND:
+            return int(slots[v, u]), k
+    return BACKGROUND, reach + 1

@@ -13,6 +13,9 @@ Flags = NDArray[np.bool_]
 N_SLOTS = 256
 """0 is what no layer explains, 1 the background, the others are segments."""
 
+CLEARLY = 2.0
+"""By so much another segment must fit worse for one to be known by colours that hardly fit, in nats per pixel."""
+
 LEAST_TAUGHT_PX = 30
 """A segment must show more pixels for its colours to be learned: the rims of a smaller one are mixed with others."""
 
@@ -203,3 +206,32 @@ class KnownSegments:
         fitting = np.where(lost, fits, 0)
         best = int(np.argmax(fitting))
         return best if fitting[best] > 0.4 else 0
+
+    def of_one_hue(self, colours: NDArray[np.uint16], slot: int, beside: NDArray[Any]) -> list[int]:
+        """The segment of whose hue a part is, in any light, that comes to light from below another one; none or one.
+
+        It is one that is beside the part, or one that was carried there, if nothing else is nearly so like it.
+
+        Parameters
+        ----------
+        colours : (n,) uint16
+            Bins of its pixels.
+        slot : int
+            What it comes to light from below.
+        beside : (m,) int
+            Slots next to it.
+        """
+        from sec_lab.segmentation._layer_kernels import N_LIGHTNESS
+
+        known = [int(k) for k in np.flatnonzero(self.known & ~self.mover) if k > 1]
+        hue = colours % (self.tables.shape[1] // N_LIGHTNESS)
+        cost = {k: float(self.tables[k].reshape(N_LIGHTNESS, -1).min(axis=0)[hue].mean()) for k in known}
+        others = [k for k in known if k != slot]
+        best = min(others, key=cost.__getitem__, default=slot)
+        if best == slot or cost[best] >= cost.get(slot, np.inf) - CLEARLY:
+            return []
+        if best in beside and cost[best] < self._p.fitting_cost:
+            return [best]
+        alone = all(cost[best] < cost[k] - CLEARLY for k in others if k != best)
+        carried = bool(self.moving[best] or self.hidden[best])
+        return [best] if alone and carried and cost[best] < self._p.unknown_cost else []

@@ -1,11 +1,12 @@
 """Which segment a part of the picture belongs to that is small, unknown or left behind (``layers.py``)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sec_lab.segmentation.known_segments import N_SLOTS, KnownSegments, Slots
+from sec_lab.segmentation.known_segments import CLEARLY, N_SLOTS, KnownSegments, Slots
 from sec_lab.segmentation.layer_parameters import LayerParameters
 
 UNTAUGHT = 256
@@ -25,8 +26,6 @@ _ELSEWHERE, _COME_TO_LIGHT = 4.0, 2.0
 """Of a part away from its segment, by colour alone; and if the segment was hidden."""
 _LACKING = 2.5
 """By so much colours may fit worse if most of a segment is missing right here: it is in another light."""
-_CLEARLY = 2.0
-"""By so much another segment must fit worse for one to be known by colours that hardly fit."""
 _SURELY = 1.0
 """By so much colours must fit better where nothing but colour speaks for a segment."""
 
@@ -87,7 +86,10 @@ class Questions:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part in question and what is around it; the arrays have an entry for every slot."""
+    """A part in question and what is around it; the arrays have an entry for every slot.
+
+    ``colours`` gives the bins of its pixels.
+    """
 
     slot: int
     area: int
@@ -100,6 +102,7 @@ class Part:
     below: NDArray[np.float32]
     colour: NDArray[np.float32]
     fits: NDArray[np.float32]
+    colours: Callable[[], NDArray[np.uint16]]
 
 
 def parts_of(slots: Slots, unknown_for: Slots, resting_for: Slots) -> Parts:
@@ -172,6 +175,8 @@ class Judge:
         if self._is_ground(part):
             return UNTAUGHT + 1
         best, least, fits = 0, np.inf, False
+        # A rim at the border that has been strange for long is what a hand has shifted there, not a hand that comes in.
+        enters = part.border and part.unknown_for < p.wait_frames
         asked = (part.around > _HARDLY_BESIDE) | (part.guess > _EXPECTED) | segments.close_to(part.box)
         # What was carried under a hand comes to light far from where it was last seen.
         asked |= segments.hidden & ~segments.mover
@@ -182,7 +187,7 @@ class Judge:
             lacking = bool(segments.missing[slot]) and part.around[slot] > _LARGELY_BESIDE
             fitting = part.colour[slot] < p.fitting_cost + (_LACKING if lacking else 0)
             near = part.around[slot] > _BESIDE or part.guess[slot] > _EXPECTED
-            grows = segments.mover[slot] and (fitting or part.border or segments.young(slot))
+            grows = segments.mover[slot] and (fitting or enters or segments.young(slot))
             if near and (grows or ((segments.moving[slot] or segments.missing[slot]) and fitting)):
                 score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
             elif part.colour[slot] < p.fitting_cost - _SURELY:
@@ -193,7 +198,7 @@ class Judge:
                 continue
             if score < least:
                 best, least, fits = int(slot), float(score), bool(fitting)
-        if not best and part.border:
+        if not best and enters:
             best = segments.mover_close_by(part.box)
         if best and (fits or part.border or segments.young(best)):
             segments.moving[best] = True
@@ -224,12 +229,12 @@ class Judge:
         bound = self.parameters.unknown_cost
         others = np.ones_like(segments.known)
         if segments.missing[slot] and part.around[slot] > _LARGELY_BESIDE:
-            bound += _CLEARLY
+            bound += CLEARLY
             others = part.around > _HARDLY_BESIDE
         elif not segments.hidden[slot]:
             return False
         others[slot] = False
-        fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - _CLEARLY)
+        fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - CLEARLY)
         return bool(fits and part.area < 1.2 * segments.most_px[slot])
 
     def _is_ground(self, part: Part) -> bool:
@@ -241,6 +246,11 @@ class Judge:
         fresh = (self.segments.born > self.visit) & ~self.segments.mover & self.segments.known & (part.around > _BESIDE)
         if fresh.any():
             return int(np.argmax(np.where(fresh, part.around, 0)))
+        lifted = self.segments.moving & ~self.segments.mover
+        if part.below[lifted].sum() > 0.5:
+            below = int(np.argmax(np.where(lifted, part.below, 0)))
+            for slot in self.segments.of_one_hue(part.colours(), below, np.flatnonzero(part.around > _HARDLY_BESIDE)):
+                return slot
         hand = float(part.around[self.segments.mover].sum())
         large = part.area >= self.new_px and part.thick
         if large and (hand < 0.3 or part.area >= 4 * self.new_px):

@@ -1,5 +1,6 @@
 """The layers of a scene as a movie goes on: what rests, what lies behind it, what moves (see ``layers.py``)."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,16 @@ from sec_lab.segmentation.appearance import Lab, background_behind, smoothed_lab
 from sec_lab.segmentation.flow import dense_inverse_search, grey_flow, reduced_grey
 from sec_lab.segmentation.known_segments import KnownSegments, Slots
 from sec_lab.segmentation.layer_parameters import LayerParameters
-from sec_lab.segmentation.part_judging import UNTAUGHT, Judge, Part, parts_of, questions_about
+from sec_lab.segmentation.part_judging import UNTAUGHT, Judge, Part, Parts, parts_of, questions_about
 
 _OFF_SHARE = 0.2
 """Share of the largest area of a segment that must come to light below it to be a thing of its own."""
 
 _STILL_FRAMES = 2
 """Pixels that are still for so long belong to it, too."""
+
+_RIM_PX = 3
+"""How far pixels of mixed colours may lie from a segment: the blur of a camera and of compression."""
 
 
 class Layers:
@@ -85,7 +89,8 @@ class Layers:
             found, relaxed = relaxed, found
         slots = found.copy()
         self._judge(slots, taught, predicted, lab, bins)
-        self._part_off(slots, taught, costs[0])
+        self._part_off(slots, taught, costs[0], bins)
+        _part_kernels.close_rims(slots, self.rest, costs, segments.moving, np.float32(p.unknown_cost), _RIM_PX, taught)
         movers_there = segments.mover[slots].any()
         if not movers_there:
             self._visit = segments.n_steps
@@ -226,6 +231,7 @@ class Layers:
                 below[k],
                 colour[k],
                 fits[k],
+                partial(_colours_of, bins, parts, at),
             )
             if questions.left[at]:
                 # What has the mover's own colours stays with it as long as it is there.
@@ -245,7 +251,9 @@ class Layers:
                 new[at] = UNTAUGHT + judge.absorbing(part)
         _part_kernels.recolour(parts.where, new, slots, taught)
 
-    def _part_off(self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32]) -> None:
+    def _part_off(
+        self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32], bins: NDArray[np.uint16]
+    ) -> None:
         """Make a segment of what lay below another one that was lifted off it: two things, taken for one so far."""
         import cv2
 
@@ -263,7 +271,7 @@ class Layers:
         )
         if n < self._new_px:
             return
-        square = np.ones((3, 3), np.uint8)
+        square, rims = (np.ones((2 * px + 1, 2 * px + 1), np.uint8) for px in (1, _RIM_PX))
         below = cv2.morphologyEx((still >= _STILL_FRAMES).astype(np.uint8), cv2.MORPH_OPEN, square)
         n_parts, parts, boxes, _ = cv2.connectedComponentsWithStats(below, connectivity=4)
         for part in range(1, n_parts):
@@ -272,12 +280,20 @@ class Layers:
             least = max(self._new_px, _OFF_SHARE * segments.most_px[slot])
             if (still[where] >= wait).sum() < least:
                 continue
-            around = slots[(cv2.dilate(where.view(np.uint8), square) > 0) & ~where]
-            beside = np.flatnonzero(np.bincount(around, minlength=256) > 0)
-            fresh = [k for k in beside if segments.parted_off[k]]
+            beside, near = (
+                np.unique(slots[(cv2.dilate(where.view(np.uint8), reach) > 0) & ~where]) for reach in (square, rims)
+            )
+            fresh = [k for k in beside if segments.parted_off[k]] or segments.of_one_hue(bins[where], slot, near)
             left, top, width, height = boxes[part, : cv2.CC_STAT_AREA]
             box = np.array([top, left, top + height - 1, left + width - 1], dtype=np.int64)
             new = fresh[0] if fresh else segments.new(box, self.slots, self.rest, mover=False)
             segments.parted_off[new] = new > 1
             slots[where] = new
             taught[where] = 1
+
+
+def _colours_of(bins: NDArray[np.uint16], parts: Parts, at: int) -> NDArray[np.uint16]:
+    """Bins of the pixels of a part."""
+    top, left, bottom, right = parts.box[at]
+    box = np.s_[top : bottom + 1, left : right + 1]
+    return np.asarray(bins[box][parts.where[box] == at])

@@ -11,16 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab.segmentation.appearance import smoothed_lab
+from sec_lab.segmentation.static_parts import (
+    BACKGROUND,
+    MAX_OBJECTS,
+    RISES,
+    Floats,
+    Labels,
+    parted_at_necks,
+    tidied,
+    with_coloured_parts,
+    with_things_on_top,
+)
 
-Labels = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-
-BACKGROUND = 1
-_RISES = 3.0
 _STRANGE = 2.0
-_JUMP = 6.0
-_SURROUNDED = 0.8
-MAX_OBJECTS = 100
 
 
 def static_segments(
@@ -51,13 +54,13 @@ def static_segments(
     rise = None if depth_m is None else rise_above_plane(depth_m)
     seeds = _seeds(unusual, rise, least_px)
     grown = _confirmed(_grown(lab, bins, seeds, rise, least_px), unusual, rise)
-    whole = _parted(bins, grown, least_px)
+    whole = parted_at_necks(bins, grown, least_px)
     if not (whole > BACKGROUND).any():
         return whole
     domains = superparamagnetic_clustering(image, parameters=PottsParameters(minimum_size_px=max(10, least_px)))
     if rise is not None:
-        whole = _with_things_on_top(bins, domains, whole, rise, least_px)
-    return _coloured(bins, domains, whole, least_px)
+        whole = with_things_on_top(bins, domains, whole, rise, least_px)
+    return with_coloured_parts(lab, bins, domains, whole, rise, least_px)
 
 
 def rise_above_plane(depth_m: NDArray[np.float32]) -> Floats:
@@ -137,7 +140,7 @@ def _confirmed(labels: Labels, unusual: Floats, rise: Floats | None) -> Labels:
         inside = labels == slot
         heights = rise[inside]
         heights = heights[np.isfinite(heights)]
-        raised = len(heights) > 0.4 * inside.sum() and np.median(heights) >= _RISES
+        raised = len(heights) > 0.4 * inside.sum() and np.median(heights) >= RISES
         if not raised and np.median(unusual[inside]) < typical + _STRANGE:
             confirmed[inside] = BACKGROUND
     return confirmed
@@ -154,8 +157,8 @@ def _seeds(unusual: Floats, rise: Floats | None, least_px: int) -> NDArray[np.in
     flat = np.zeros_like(strange)
     if rise is not None:
         smooth = cv2.medianBlur(np.nan_to_num(rise, nan=0.0, posinf=0.0, neginf=0.0), 5)
-        raised = smooth > _RISES
-        flat = np.isfinite(rise) & (np.abs(smooth) < 0.6 * _RISES)
+        raised = smooth > RISES
+        flat = np.isfinite(rise) & (np.abs(smooth) < 0.6 * RISES)
         # A colour alone is no object where depth says that it lies in the plane.
         strange &= ~cv2.erode(flat.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)
     # Depth from matched windows reaches beyond an object's border, so only what is well inside is certain.
@@ -176,7 +179,7 @@ def _seeds(unusual: Floats, rise: Floats | None, least_px: int) -> NDArray[np.in
             heights = rise[inside]
             known = np.isfinite(heights)
             if known.mean() > 0.4:
-                if np.median(heights[known]) < 0.75 * _RISES:
+                if np.median(heights[known]) < 0.75 * RISES:
                     continue
             elif np.median(unusual[inside]) < typical + 3.0:
                 continue
@@ -208,9 +211,9 @@ def _grown(
         raised = cv2.erode(known, np.ones((7, 7), np.uint8))
         # What stands out by its height ends where the plane is seen.
         smooth = cv2.dilate(cv2.medianBlur(known, 5), np.ones((3, 3), np.uint8))
-        level = np.minimum(0.25 * np.maximum(_RISES - smooth, 0.0) ** 2, 4).astype(np.float32)
+        level = np.minimum(0.25 * np.maximum(RISES - smooth, 0.0) ** 2, 4).astype(np.float32)
         level[~np.isfinite(rise)] = 0
-        stands = {int(slot) for slot in objects if np.nanmedian(np.append(rise[seeds == slot], 0)) > 2 * _RISES}
+        stands = {int(slot) for slot in objects if np.nanmedian(np.append(rise[seeds == slot], 0)) > 2 * RISES}
     for _ in range(3):
         counts[:] = 0
         kernels.count_colours(bins, labels, taught, wanted, counts)
@@ -260,188 +263,4 @@ def _grown(
             object_ = cv2.morphologyEx(spins, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
             part[free] = np.where(object_[free] == 1, slot, BACKGROUND)
             labels[box] = part
-    return _tidied(labels, least_px)
-
-
-def _tidied(labels: Labels, least_px: int) -> Labels:
-    """Each object one region without holes; what is too small belongs to the background."""
-    import cv2
-
-    tidied = np.full_like(labels, BACKGROUND)
-    number = BACKGROUND
-    for slot in np.unique(labels[labels > BACKGROUND]):
-        n, parts, statistics, _ = cv2.connectedComponentsWithStats((labels == slot).astype(np.uint8), connectivity=8)
-        if n < 2:
-            continue
-        largest = 1 + int(np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
-        if statistics[largest, cv2.CC_STAT_AREA] < least_px:
-            continue
-        outlines, _ = cv2.findContours((parts == largest).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        filled = np.zeros_like(labels)
-        cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)
-        number += 1
-        tidied[(filled > 0) & ((labels == slot) | (labels == BACKGROUND))] = number
-    return tidied
-
-
-def _parted(bins: NDArray[np.uint16], labels: Labels, least_px: int) -> Labels:
-    """Regions cut where a neck joins parts of other colours: two things, one before the other."""
-    import cv2
-
-    parted = labels.copy()
-    waiting = [int(slot) for slot in np.unique(labels[labels > BACKGROUND])]
-    number = max(waiting, default=BACKGROUND)
-    while waiting and number < MAX_OBJECTS:
-        slot = waiting.pop()
-        inside = (parted == slot).astype(np.uint8)
-        depth = cv2.distanceTransform(np.pad(inside, 1), cv2.DIST_L2, 5)[1:-1, 1:-1]
-        for radius in range(2, max(3, int(depth.max()))):
-            n, cores, statistics, _ = cv2.connectedComponentsWithStats(
-                (depth > radius).astype(np.uint8), connectivity=4
-            )
-            large = [k for k in range(1, n) if statistics[k, cv2.CC_STAT_AREA] >= max(8, least_px // 4)]
-            if len(large) < 2:
-                continue
-            large.sort(key=lambda k: -int(statistics[k, cv2.CC_STAT_AREA]))
-            other = next((k for k in large[1:] if _differ(bins, cores == large[0], cores == k)), None)
-            if other is None:
-                continue
-            far = [cv2.distanceTransform((cores != k).astype(np.uint8), cv2.DIST_L2, 5) for k in (large[0], other)]
-            costs = [_table(bins, cores == k)[bins] for k in (large[0], other)]
-            beyond = cv2.blur(costs[1] - costs[0], (3, 3)) + 0.3 * (far[1] - far[0]) < 0
-            number += 1
-            parted[(inside > 0) & beyond] = number
-            waiting += [slot, number]
-            break
-    return _tidied(parted, least_px)
-
-
-def _table(bins: NDArray[np.uint16], where: NDArray[np.bool_]) -> Floats:
-    from sec_lab.segmentation import _layer_kernels as kernels
-
-    counts = np.bincount(bins[where], minlength=kernels.N_BINS).astype(np.float32)
-    table = np.empty(kernels.N_BINS, np.float32)
-    kernels.colour_costs(counts, table)
-    return table
-
-
-def _differ(bins: NDArray[np.uint16], one: NDArray[np.bool_], other: NDArray[np.bool_], *, by: float = 3.0) -> bool:
-    """Whether the colours of two parts have little in common, either way."""
-    tables = _table(bins, one), _table(bins, other)
-    return all(
-        float((tables[1 - k][bins[where]] - tables[k][bins[where]]).mean()) > by for k, where in enumerate((one, other))
-    )
-
-
-def _with_things_on_top(
-    bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Labels, rise: Floats, least_px: int
-) -> Labels:
-    """Regions in two where something of other colours rises out of them, surrounded by the rest: what is on a plate.
-
-    Depth from matched windows reaches beyond borders, so that it only says which domains of colour belong to the thing.
-    """
-    import cv2
-
-    smooth = cv2.medianBlur(np.nan_to_num(rise, nan=0.0, posinf=0.0, neginf=0.0), 5)
-    parted = labels.copy()
-    number = int(labels.max())
-    for slot in np.unique(labels[labels > BACKGROUND]):
-        region = labels == slot
-        sizes = np.bincount(domains[region])
-        floor = region & (domains == int(np.argmax(sizes)))
-        level = float(np.median(smooth[floor]))
-        high = [
-            domain
-            for domain in np.flatnonzero(sizes)
-            if np.median(smooth[region & (domains == domain)]) >= level + _RISES
-        ]
-        raised = (region & np.isin(domains, high)).astype(np.uint8)
-        raised = cv2.morphologyEx(raised, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-        n, parts, _, _ = cv2.connectedComponentsWithStats(raised, connectivity=4)
-        for part in range(1, n):
-            piece = _filled(parts == part)
-            for domain in np.setdiff1d(np.flatnonzero(sizes >= least_px), [*high, np.argmax(sizes)]):
-                # The lower part of what rises is no higher than the floor: its colours tell whose it is.
-                lower = region & (domains == domain) & ~piece
-                if (
-                    _touch(piece, lower)
-                    and _is_surrounded(lower | piece, region)
-                    and _is_like(bins, lower, piece, floor)
-                ):
-                    piece = _filled(piece | lower)
-            rest = region & (parted == slot) & ~piece
-            if number >= MAX_OBJECTS or not 1.5 * least_px <= piece.sum() <= 0.6 * region.sum():
-                continue
-            if rest.sum() < least_px or not _is_surrounded(piece, region) or not _differ(bins, piece, rest, by=1.0):
-                continue
-            number += 1
-            parted[piece] = number
-    return parted
-
-
-def _touch(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
-    import cv2
-
-    return bool((cv2.dilate(one.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)[other].any())
-
-
-def _is_like(
-    bins: NDArray[np.uint16], part: NDArray[np.bool_], one: NDArray[np.bool_], other: NDArray[np.bool_]
-) -> bool:
-    """Whether a part has the colours of one region rather than those of another."""
-    return bool((_table(bins, other)[bins[part]] - _table(bins, one)[bins[part]]).mean() > 1.0)
-
-
-def _filled(piece: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A connected piece without holes."""
-    import cv2
-
-    outlines, _ = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    filled = np.zeros(piece.shape, np.uint8)
-    cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)
-    return filled > 0
-
-
-def _is_surrounded(piece: NDArray[np.bool_], region: NDArray[np.bool_]) -> bool:
-    """Whether most of what lies around a piece, as far as half its radius, belongs to its region."""
-    import cv2
-
-    reach = max(3, round(0.5 * float(np.sqrt(piece.sum() / np.pi))))
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    around = (cv2.dilate(piece.astype(np.uint8), disc) > 0) & ~piece
-    return bool(region[around].mean() > _SURROUNDED)
-
-
-def _coloured(bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Labels, least_px: int) -> Labels:
-    """Regions with a large part of another colour in two: what a cup holds. Rims and bands stay."""
-    import cv2
-
-    parted = labels.copy()
-    number = int(labels.max())
-    for slot in np.unique(labels[labels > BACKGROUND]):
-        region = labels == slot
-        area = int(region.sum())
-        least = max(1.5 * least_px, 0.12 * area)
-        sizes = np.bincount(domains[region])
-        for domain in np.flatnonzero(sizes >= least):
-            if number >= MAX_OBJECTS:
-                break
-            part = cv2.morphologyEx((region & (domains == domain)).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3)))
-            n, pieces, statistics, _ = cv2.connectedComponentsWithStats(part, connectivity=4)
-            rest = region & (parted == slot) & (part == 0)
-            if n < 2 or rest.sum() < least:
-                continue
-            piece = pieces == 1 + int(np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
-            if not least <= piece.sum() <= 0.6 * area or not _is_thick(piece) or not _differ(bins, piece, rest):
-                continue
-            number += 1
-            parted[piece] = number
-    return parted
-
-
-def _is_thick(part: NDArray[np.bool_]) -> bool:
-    """Whether a part is more than a rim or a band: its thickness is at least 0.6 of that of a disc of the same area."""
-    import cv2
-
-    thickness = float(cv2.distanceTransform(np.pad(part, 1).astype(np.uint8), cv2.DIST_L2, 5).max())
-    return thickness > 0.6 * float(np.sqrt(part.sum() / np.pi))
+    return tidied(labels, least_px)

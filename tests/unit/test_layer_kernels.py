@@ -19,6 +19,7 @@ from tests.naive_layers import (
     naive_presence,
     naive_recoloured,
     naive_relaxed,
+    naive_rims,
     naive_settled,
     naive_surroundings,
     naive_warped,
@@ -345,3 +346,28 @@ def test_presence(size: tuple[int, int], seed: int) -> None:
     # What is not to be seen is still known to have been where it was.
     remembered = {2: (1, 1, 2, 2), 4: (1, 1, 2, 2)} | expected_boxes
     assert {int(slot): tuple(boxes[slot].tolist()) for slot in np.flatnonzero(boxes[:, 2] >= 0)} == remembered
+
+
+@given(SIZES, SEEDS)
+def test_close_rims(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    slots, rest = (rng.choice(np.array([1, 1, 1, 2, 3, 4], np.uint8), size) for _ in range(2))
+    costs = rng.uniform(8, 16, (2, *size)).astype(np.float32)
+    moving = np.zeros(256, np.bool_)
+    moving[2:4] = rng.random(2) < 0.5
+    expected = naive_rims(slots, rest, costs, moving, 12.0, 3)
+    closed, taught = slots.copy(), np.ones(size, np.uint8)
+    _part_kernels.close_rims(closed, rest, costs, moving, np.float32(12), 3, taught)
+    np.testing.assert_array_equal(closed, expected)
+    np.testing.assert_array_equal(taught == 0, closed != slots)
+
+
+def test_a_rim_between_a_hand_and_what_it_holds_is_closed_and_a_gap_is_not() -> None:
+    slots = np.array([[2, 2, 1, 1, 3, 3]], np.uint8)
+    rest = np.ones_like(slots)
+    moving = np.arange(256) == 2
+    for strange, expected in ((15.0, [2, 2, 2, 3, 3, 3]), (5.0, [2, 2, 1, 1, 3, 3])):
+        closed = slots.copy()
+        costs = np.full((2, *slots.shape), strange, np.float32)
+        _part_kernels.close_rims(closed, rest, costs, moving, np.float32(12), 3, np.ones_like(slots))
+        assert closed[0].tolist() == expected

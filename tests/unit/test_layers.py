@@ -203,6 +203,32 @@ class TestLid:
         assert movie.seen(-1) == {1, lid, box}
 
 
+class TestBook:
+    """A red book of whose pages a strip is to be seen, in the shade, until a hand takes the upper cover off them."""
+
+    LOWER, PAGES = Block((50, 30), RED, 52, 46), Block((49, 30), (228, 224, 210), 42, 38)
+    SIDE = Block((67, 30), (160, 157, 147), 7, 38)
+
+    def test_what_comes_to_light_below_the_cover_is_of_the_pages(self) -> None:
+        def moment(place: Place, hand: Place | None = None) -> Moment:
+            return Moment((self.LOWER, self.PAGES, self.SIDE, Block(place, RED, 36, 46)), hand)
+
+        closed, aside = (46.0, 30.0), (46.0, 80.0)
+        movie = Movie(
+            [
+                *[moment(closed)] * 8,
+                *(moment(closed, hand) for hand in path((47, OUTSIDE), (47, 38))),
+                *(moment(place, (47, place[1] + 8)) for place in path(closed, aside)),
+                *(moment(aside, hand) for hand in path((47, 88), (47, OUTSIDE))),
+                *[moment(aside)] * 16,
+            ]
+        )
+        assert movie.seen(0) == {1, 2, 3}
+        pages = movie.label(0, 3)
+        assert pages != movie.label(0, 4)
+        assert movie.label(-1, 2) == pages
+
+
 class TestCarriedObject:
     @pytest.mark.parametrize(("first", "last"), [((24, 30), (24, 66)), ((24, 66), (24, 30)), ((20, 44), (74, 44))])
     def test_it_keeps_its_label_and_leaves_the_background(self, first: Place, last: Place) -> None:

@@ -177,6 +177,21 @@ def test_what_has_left_its_place_is_carried_by_what_moves_beside_it() -> None:
     assert [relation for _, relation in without] == [A, N]
 
 
+def test_an_arm_that_pauses_above_the_table_does_not_come_to_lie_on_it() -> None:
+    """It reaches in from the border; what stands still within the picture, or for longer, has come to rest."""
+    comes = [picture(hand=hand_from_the_right(tip)) for tip in range(118, 59, -2)]
+    movie = [picture()] * 15 + comes + [comes[-1]] * 30 + comes[::-1]
+    assert N in dict(story(steady(movie), TABLE, HAND)).values()
+    assert T not in dict(story(steady(movie), TABLE, HAND)).values()
+    for pause in (0, 10):
+        relations = [relation for _, relation in story(steady(movie, pause_frames=pause), TABLE, HAND)]
+        assert relations[:3] in ([A, N, O], [A, N, T])
+    inside = [picture(hand=(25, 55, 10 + n, 40 + n)) for n in range(0, 40, 2)]
+    put = [relation for _, relation in story(steady([*inside, *[inside[-1]] * 30]), TABLE, HAND)]
+    assert put[0] == N
+    assert put[1] in {O, T}
+
+
 def test_contact_with_what_moves_is_touching_however_it_looks() -> None:
     """A hand is surrounded by the table when it comes from above and is not when it comes from the border."""
     inside = [picture(hand=(20, 50, 40 + n, 60 + n)) for n in range(40)]
@@ -319,6 +334,7 @@ def movies(draw: st.DrawFn) -> tuple[Movie, list[set[int]]]:
     hysteresis=st.integers(0, 5),
     min_life=st.integers(1, 5),
     hold=st.integers(0, 9),
+    pause=st.integers(0, 9),
     switches=st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans()),
     visible=st.sampled_from([0.0, 0.3, 0.7]),
 )
@@ -327,6 +343,7 @@ def test_steady_relations_as_the_slow_reference_finds_them(
     hysteresis: int,
     min_life: int,
     hold: int,
+    pause: int,
     switches: tuple[bool, bool, bool, bool],
     visible: float,
 ) -> None:
@@ -337,6 +354,7 @@ def test_steady_relations_as_the_slow_reference_finds_them(
             hysteresis_frames=hysteresis,
             min_life_frames=min_life,
             hold_frames=hold,
+            pause_frames=pause,
             together_frames=0,
             visible_share=visible,
         ),

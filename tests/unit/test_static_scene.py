@@ -80,6 +80,19 @@ class TestStaticSegments:
         assert len(np.unique(red)) == len(np.unique(blue)) == 1
         assert red[0, 0] != blue[0, 0]
 
+    def test_two_things_with_middles_of_one_colour_joined_by_a_narrow_neck(self) -> None:
+        white = (228, 224, 210)
+        found = self.segments(
+            [
+                *(Block((50, column), colour, 30, 30) for column, colour in ((34, RED), (80, BLUE))),
+                *(Block((50, column), white, 20, 20) for column in (34, 80)),
+                Block((50, 53), RED, 7, 10),
+                Block((50, 61), BLUE, 7, 10),
+            ]
+        )
+        assert found[50, 34] != found[50, 80]
+        assert min(found[50, 34], found[50, 80]) > 1
+
     def test_one_thing_with_a_neck_stays_one(self) -> None:
         found = self.segments([Block((50, 34), RED, 24, 24), Block((50, 76), RED, 24, 24), Block((50, 55), RED, 8, 24)])
         assert set(np.unique(found)) == {1, 2}
@@ -122,4 +135,41 @@ class TestThingsOnThings:
     def test_the_cap_of_a_bottle_stays_with_it(self) -> None:
         """It rises and has its own colour, but lies at the border of its region."""
         found, _ = self.segments(RED, 9, place=(33, 60))
+        assert set(np.unique(found)) == {1, 2}
+
+
+class TestPartsOfAnotherHue:
+    """A red thing with something white in it, as pages or milk."""
+
+    WHITE = (228, 224, 210)
+
+    def segments(self, part: Block, *, lower: float = 0, around: Sequence[Block] = ()) -> tuple[Any, Any]:
+        """``lower``: how far the part lies below the thing, in units of the noise of depth."""
+        rng = np.random.default_rng(3)
+        picture, truth = drawn(
+            Moment([Block((48, 60), RED, 52, 52), part, *around]), rng.normal(0, 2, (HEIGHT, WIDTH, 3))
+        )
+        inverse = 1 / plane() + rng.normal(0, 0.01, (HEIGHT, WIDTH))
+        inverse += 0.12 * (truth == 1) + (0.12 - 0.01 * lower) * (truth == 2)
+        return static_segments(picture, depth_m=(1 / inverse).astype(np.float32)), truth
+
+    def test_the_pages_of_a_closed_book_are_a_part(self) -> None:
+        found, truth = self.segments(Block((66, 60), self.WHITE, 8, 46))
+        pages, cover = found[66, 60], found[40, 60]
+        assert len({int(pages), int(cover), 1}) == 3
+        assert ((found == pages) & (truth == 2)).sum() > 0.75 * (truth == 2).sum()
+
+    def test_a_band_that_runs_across_is_none(self) -> None:
+        found, _ = self.segments(Block((48, 60), self.WHITE, 9, 52))
+        assert set(np.unique(found)) == {1, 2}
+
+    @pytest.mark.parametrize(("lower", "parts"), [(6, {1, 2, 3}), (0, {1, 2})])
+    def test_what_a_cup_holds_lies_lower_than_its_rim_and_a_painted_mark_does_not(
+        self, lower: float, parts: set[int]
+    ) -> None:
+        found, _ = self.segments(Block((48, 60), self.WHITE, 16, 18), lower=lower)
+        assert set(np.unique(found)) == parts
+
+    def test_a_shade_of_the_same_hue_is_no_part(self) -> None:
+        found, _ = self.segments(Block((66, 60), (110, 26, 24), 8, 46))
         assert set(np.unique(found)) == {1, 2}
