@@ -19,7 +19,7 @@ from sec_lab.worlds.katana.scenes import random_scene
 if TYPE_CHECKING:
     import pandas as pd
 
-SEED, N_SCENES = 2017, 100
+SEED, N_SCENES = 2018, 100
 
 _BINS_DEG = (0.0, 15.0, 30.0, 45.0)
 
