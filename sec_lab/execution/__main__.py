@@ -5,9 +5,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sec_lab.execution.study import N_PLANTED, N_SCENES, SEED, planted_trials, skill_of, trials
+from sec_lab.execution.enriched_files import read_enriched_folder
+from sec_lab.execution.planning import learn_skill
+from sec_lab.execution.planted import N_PLANTED, planted_trials
+from sec_lab.execution.study import N_SCENES, SEED, trials
 from sec_lab.files import write_whole
-from sec_lab.worlds.katana.stored import read_demonstrations
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -28,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Learn pushing from demonstrations, push in random scenes and with planted failures, write tables.",
         epilog="example: python -m sec_lab.execution datasets/katana_pushing datasets/katana_scenes --jobs 2",
     )
-    parser.add_argument("demonstrations", type=Path, help="folder of the demonstrations")
+    parser.add_argument("demonstrations", type=Path, help="folder of the demonstrations' GraphML")
     parser.add_argument("folder", type=Path, help="where the tables go")
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the scenes (default {SEED})")
     parser.add_argument("--number", type=int, default=N_SCENES, help=f"of scenes (default {N_SCENES})")
@@ -43,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f"{given.seed}, {given.number}, {given.planted} and {given.jobs}"
         )
     try:
-        skill = skill_of(read_demonstrations(given.demonstrations))
+        skill = learn_skill(read_enriched_folder(given.demonstrations))
         given.folder.mkdir(parents=True, exist_ok=True)
         scenes = trials(skill, seed=given.seed, n=given.number, n_jobs=given.jobs)
         write_whole(given.folder / "scenes.csv", scenes.to_csv(index=False, lineterminator="\n"))

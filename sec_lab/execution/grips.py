@@ -23,8 +23,8 @@ CLEARANCE_M = 0.045
 OVER_M = 0.12
 """Least height at which the tip passes over things."""
 
-_LEAST_HEIGHT_M = 0.022
-"""Lower the fingers come too near to the table."""
+_LEAST_HEIGHT_M = 0.026
+"""Lower the fingers, which reach beyond the tip and stand askew, come too near to the table."""
 FINGERS_BEYOND_M = 0.012
 """How far the fingers reach beyond the tip (table of facts)."""
 _FINGER_M = 0.025
@@ -208,7 +208,10 @@ def pushed_to(skill: Skill, system: System) -> Floats:
 
 
 def _push_height(skill: Skill, system: System) -> float:
-    return max(_LEAST_HEIGHT_M, float(np.median(skill.touches.points_m[:, 2] + system.first.top_m / 2)))
+    """Of the tip: as far above the middle of what is pushed as in the demonstrations; above it things tip over."""
+    first = system.first
+    middle = first.top_m / 2 if first.solid is None else first.solid.middle_m
+    return max(_LEAST_HEIGHT_M, float(np.median(skill.touches.points_m[:, 2])) + middle)
 
 
 def _border(thing: SeenThing, height_m: float) -> Floats:

@@ -20,13 +20,13 @@ from sec_lab.worlds.katana.run import FRAMES_PER_SECOND
 _NUDGE_M, _TOUCH_M, _MOST_FURTHER_M, _MOST_NUDGES = 0.003, 0.0005, 0.02, 6
 _PUSHED_M = 0.001
 """Who moves by this was touched: the second object's motion proves that the first has reached it."""
-_LOOSE_M, _MOST_OFF_M = 0.0003, 0.002
-"""How much wider than while the one pushed the other their gap may look in the end; and how far off it may have looked
-then, when it was none."""
+_LOOSE_M, _OFF_M = 0.0003, 0.0002
+"""How much wider than while the one pushed the other their gap may look in the end; and how far off a gap may look
+besides what a pixel hides: twice the step of the range finder."""
+_NEAR_M = 0.0005
+"""How much wider it may look still while the arm is near, which may hide a part."""
 _LET_GO_M = 0.0005
 """The same of what was let go beside it, not pressed on."""
-_SPRUNG_M = 0.0012
-"""How much more than while the one was pressed on the other, which makes both give way a little."""
 _MOST_ATTEMPTS = 4
 _SLOWER = 0.5
 """Share of its speed at which the arm moves among the things after a failure."""
@@ -83,6 +83,9 @@ class Outcome:
         Why there was no further attempt; empty after success.
     time_s : float
         Simulated.
+    failed_in, failed_by : int or None
+        Number of the attempt in which a planted failure struck, and of the last frame of its rule, for judging only;
+        None if none did.
     """
 
     success: bool
@@ -94,6 +97,8 @@ class Outcome:
     n_attempts: int
     gave_up: str
     time_s: float
+    failed_in: int | None = None
+    failed_by: int | None = None
 
     @property
     def chain(self) -> EventChain | None:
@@ -139,6 +144,8 @@ def execute_skill(
     steps = _planned(run, watcher, scene, skill, again=False)
     verdicts: list[Verdict] = []
     attempt, gave_up = 0, ""
+    failed_in: int | None = None
+    failed_by: int | None = None
     while True:
         if tell is not None:
             tell(steps, tuple(verdicts))
@@ -148,11 +155,14 @@ def execute_skill(
             # What is held is let go where it has been brought, not where it was to be brought.
             step = _shifted(planned, further) if skill.hand.closes else planned
             why, further = _do(run, step, watcher, seen, skill)
+            if failed_in is None and run.has_failed:
+                failed_in, failed_by = attempt, run.n_frames - 1
             perceived = watcher.perceived()
             if not why and frozenset(step.rule.pair) == {skill.first, skill.second}:
                 pressed = 0.0 if skill.hand.closes else _pressed(perceived, skill)
-            if not why and step.column_is_last:
-                why = loose(perceived, skill, pressed_m=pressed)
+            has_parted = step.rule.change == "TN" and set(step.rule.pair) == {skill.prime, skill.first}
+            if not why and (has_parted or step.column_is_last):
+                why = loose(perceived, skill, pressed_m=pressed, spare_m=0.0 if step.column_is_last else _NEAR_M)
             verdicts.append(Verdict(attempt, told(step.rule), len(watcher), not why, why))
             if tell is not None:
                 tell(steps, tuple(verdicts))
@@ -167,7 +177,9 @@ def execute_skill(
             gave_up = f"{attempt} attempts failed"
             break
         # What has been seen whole stays known, though it may be half hidden now.
-        renewed = Watcher(scene.camera, frames_per_second=FRAMES_PER_SECOND, known=watcher.known)
+        renewed = Watcher(
+            scene.camera, frames_per_second=FRAMES_PER_SECOND, known=watcher.known, touching=watcher.touching()
+        )
         try:
             steps = _planned(run, renewed, scene, skill, again=True)
         except ValueError as error:
@@ -184,6 +196,8 @@ def execute_skill(
         attempt + (0 if gave_up else 1),
         gave_up,
         run.time_s,
+        failed_in,
+        failed_by,
     )
 
 
@@ -224,23 +238,28 @@ def agreement(observation: Observation, skill: Skill, column: int) -> str:
     return ""
 
 
-def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None) -> str:
-    """What is wrong with the final contact of first and second object as it looks with the arm away; empty if nothing.
+def loose(perceived: Perceived, skill: Skill, *, pressed_m: float | None = None, spare_m: float = 0.0) -> str:
+    """What is wrong with the final contact of first and second object as it looks with the arm off; empty if nothing.
 
     Parameters
     ----------
     perceived : Perceived
     skill : Skill
     pressed_m : float, optional
-        How wide the gap looked while the one pushed the other, so that there was none; what is left out is known from
-        the demonstrations.
+        How wide the gap looked while the one pushed the other, so that there was none: it may look as wide again. What
+        is left out is known from the demonstrations.
+    spare_m : float, optional
+        How much wider it may look for another reason.
     """
     gap = perceived.last_gap_m(skill.first, skill.second)
-    none = skill.contact_gap_m if pressed_m is None else min(max(pressed_m, 0.0), _MOST_OFF_M)
-    most = none + (_LET_GO_M if skill.hand.closes else _LOOSE_M)
+    none = skill.contact_gap_m
     if pressed_m is not None:
-        # Where both look larger than they are, it is how far they have sprung apart that tells.
-        most = min(most, pressed_m + _SPRUNG_M)
+        # How far off a gap looks is at most what the pixels leave open. What is seen while the one presses on the other
+        # cannot say more: they give way, and spring back.
+        unsure = perceived.last_unsure_m(skill.first, skill.second)
+        none = float(np.clip(pressed_m, -unsure, unsure + _OFF_M))
+    most = none + (_LET_GO_M if skill.hand.closes else _LOOSE_M)
+    most += spare_m
     if gap <= most:
         return ""
     pair = _told(frozenset((skill.first, skill.second)))
@@ -348,8 +367,9 @@ def _seen_from(run: Run, watcher: Watcher, start: int) -> Callable[[], None]:
 
     def look() -> None:
         nonlocal taken
-        for frame, tip in zip(run.frames_since(taken), run.tips_since(taken), strict=True):
-            watcher.add(frame, tip_m=tip)
+        news = zip(run.frames_since(taken), run.tips_since(taken), run.joints_since(taken), strict=True)
+        for frame, tip, joints in news:
+            watcher.add(frame, tip_m=tip, joints_rad=joints)
         taken = run.n_frames
 
     return look

@@ -3,8 +3,8 @@
 Nothing here knows what the simulator knows: pictures, range pictures and where the camera stands are all there is.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
+from sec_lab.execution.own_hand import hand_points
 from sec_lab.execution.solids import Solid, follow, gap_between, gap_to_points, raised
 from sec_lab.execution.things import ARM, COLOURS, TABLE, SeenThing, named_things, rays_of, things_in
 from sec_lab.observation import Observation
@@ -46,8 +47,11 @@ ARM_CONTACT_M = (0.005, 0.009)
 """The same between a thing and the arm's tip, of whose shape only what is seen is known."""
 
 FINGER_M = 0.025
-"""Width of the fingers. An arm knows its own hand: where it stands before what it touches, its far side is hidden, and
-lies so far behind what is seen of it."""
+"""Width of the fingers. An arm knows its own hand: where it stands before what it touches, its far side is hidden. It
+is where the joints say; where these are not known, it lies at most so far behind what is seen."""
+
+_OWN_M = 0.01
+"""How far what is seen of its hand may be from where the joints say that it is."""
 
 FINGERS_LONG_M = 0.06
 """How long they are."""
@@ -83,6 +87,8 @@ class Perceived:
         How far each thing lies from where it was seen first.
     drift_m : dict of str to float
         How far it has moved within the last frames.
+    unsure_m : dict of pair of str to float, optional
+        By how much the gap between two things may be another for the size of a pixel, as they stand last.
     """
 
     observation: Observation
@@ -90,6 +96,7 @@ class Perceived:
     gaps_m: dict[tuple[str, str], Floats]
     moved_m: dict[str, float]
     drift_m: dict[str, float]
+    unsure_m: dict[tuple[str, str], float] = field(default_factory=dict)
 
     def last_gap_m(self, one: str, other: str) -> float:
         """Gap between two things as it was seen last, the median of a few frames.
@@ -104,6 +111,10 @@ class Perceived:
                 return float(np.median(gaps[-_RESTING_FRAMES:]))
         raise ValueError(f"pair: expected one of {sorted(self.gaps_m)}, got {(one, other)}")
 
+    def last_unsure_m(self, one: str, other: str) -> float:
+        """By how much the gap between two things may be another; 0 if nothing is known of it."""
+        return max((unsure for pair, unsure in self.unsure_m.items() if set(pair) == {one, other}), default=0.0)
+
 
 class Watcher:
     """Perceives a movie frame by frame, and says at any time what has been seen so far.
@@ -115,6 +126,8 @@ class Watcher:
     colours : sequence of NamedColour, optional
     known : mapping of str to Solid, optional
         Shapes of things that were seen whole before; others are known from where they are seen first.
+    touching : collection of pair of str, optional
+        What touched when it was seen last: it does so until its gap is wide enough to end that.
     """
 
     def __init__(
@@ -124,6 +137,7 @@ class Watcher:
         frames_per_second: float,
         colours: Sequence[NamedColour] = COLOURS,
         known: Mapping[str, Solid] | None = None,
+        touching: Collection[tuple[str, str]] = (),
     ) -> None:
         self.camera = camera
         self.colours = tuple(colours)
@@ -137,11 +151,15 @@ class Watcher:
         self._last: dict[str, SeenThing] = {}
         self._most_px: dict[str, int] = {}
         self._fingers: Floats | None = None
+        self._hand: Floats | None = None
+        self._touched = frozenset(touching)
 
     def __len__(self) -> int:
         return len(self._centres)
 
-    def add(self, frame: Frame | View, *, tip_m: ArrayLike | None = None) -> tuple[SeenThing, ...]:
+    def add(
+        self, frame: Frame | View, *, tip_m: ArrayLike | None = None, joints_rad: ArrayLike | None = None
+    ) -> tuple[SeenThing, ...]:
         """Perceive one more frame.
 
         Parameters
@@ -150,6 +168,9 @@ class Watcher:
             With range.
         tip_m : (3,) array_like of float, optional
             Where the arm's own joints say that its tip is: it may be hidden.
+        joints_rad : (7,) array_like of float, optional
+            What these joints say, the two fingers last: then the hidden side of the hand is where they say that there
+            is one, and not wherever it might be.
 
         Returns
         -------
@@ -162,7 +183,8 @@ class Watcher:
             If the frame has no range.
         """
         self._fingers = None if tip_m is None else _fingers(tip_m)
-        found = named_things(frame, self.camera, self.colours, self._rays, self._is_new)
+        self._hand = None if joints_rad is None else hand_points(joints_rad)
+        found = [self._own(thing) for thing in named_things(frame, self.camera, self.colours, self._rays, self._is_new)]
         seen = {thing.name: self._followed(thing) for thing in found}
         for name, thing in self._last.items():
             if name not in seen and self._is_hidden(thing):
@@ -197,7 +219,7 @@ class Watcher:
         gaps = np.array(self._gaps).reshape(len(self), len(self._pairs))
         there = np.stack([_steady(np.array([name in seen for seen in self._centres]), steady) for name in names])
         touching = {
-            pair: _steady(_touching(gaps[:, place], _limits(pair)), steady) for place, pair in enumerate(self._pairs)
+            pair: _steady(self._touching(pair, gaps[:, place]), steady) for place, pair in enumerate(self._pairs)
         }
         last: dict[str, Floats] = {}
         graphs = []
@@ -221,7 +243,26 @@ class Watcher:
             {pair: gaps[:, place] for place, pair in enumerate(self._pairs)},
             {name: self._moved(name) for name in last},
             {name: self._drift(name) for name in last},
+            {pair: self._unsure(pair) for pair in self._pairs},
         )
+
+    def touching(self) -> frozenset[tuple[str, str]]:
+        """Pairs of things that touch as they are seen now, without the arm and the table."""
+        gaps = np.array(self._gaps).reshape(len(self), len(self._pairs))
+        return frozenset(
+            pair
+            for place, pair in enumerate(self._pairs)
+            if not {ARM, TABLE} & set(pair) and len(gaps) and self._touching(pair, gaps[:, place])[-1]
+        )
+
+    def _touching(self, pair: tuple[str, str], gaps: Floats) -> NDArray[np.bool_]:
+        return _touching(gaps, _limits(pair), state=pair in self._touched)
+
+    def _unsure(self, pair: tuple[str, str]) -> float:
+        one, other = (self._solids.get(name) for name in pair)
+        if one is None or other is None:
+            return 0.0
+        return one.unsure_towards_m(other.centre_m) + other.unsure_towards_m(one.centre_m)
 
     def _moved(self, name: str) -> float:
         places = [centres[name] for centres in self._centres if name in centres]
@@ -236,6 +277,15 @@ class Watcher:
     def known(self) -> dict[str, Solid]:
         """Shapes that still fit what was seen of them last."""
         return {name: solid for name, solid in self._solids.items() if solid.error_m <= _FITS_M}
+
+    def _own(self, thing: SeenThing) -> SeenThing:
+        """Of what has the arm's colour, what is its hand: between red and green, pixels look yellow."""
+        if thing.name != ARM or self._hand is None:
+            return thing
+        from scipy.spatial import KDTree
+
+        away, _ = KDTree(self._hand).query(thing.points_m, distance_upper_bound=_OWN_M)
+        return replace(thing, points_m=thing.points_m[np.isfinite(away)])
 
     def _is_new(self, name: str) -> bool:
         return name != ARM and name not in self._solids
@@ -285,7 +335,7 @@ class Watcher:
             solid = other.solid if one is arm else one.solid
             assert solid is not None
             gap = gap_to_points(solid, self._whole(arm))
-            if self._fingers is None:
+            if self._fingers is None or self._hand is not None:
                 return gap
             # An arm feels where its fingers are, be they hidden.
             return min(gap, max(0.0, gap_to_points(solid, self._fingers) - FINGER_M / 2))
@@ -297,6 +347,8 @@ class Watcher:
         """Its surface; of the arm's own fingers the hidden side, too."""
         if thing.name != ARM:
             return thing.points_m
+        if self._hand is not None:
+            return np.concatenate([thing.points_m, self._hand])
         way = thing.points_m[:, :2] - self.camera.X_WC[:2, 3]
         behind = thing.points_m.copy()
         behind[:, :2] += FINGER_M * way / np.linalg.norm(way, axis=1, keepdims=True)
@@ -383,9 +435,8 @@ def _limits(pair: tuple[str, str]) -> tuple[float, float]:
     return TABLE_CONTACT_M if TABLE in pair else ARM_CONTACT_M if ARM in pair else CONTACT_M
 
 
-def _touching(gaps: Floats, limits_m: tuple[float, float]) -> NDArray[np.bool_]:
+def _touching(gaps: Floats, limits_m: tuple[float, float], *, state: bool = False) -> NDArray[np.bool_]:
     begin, end = limits_m
-    state = False
     states = np.zeros(len(gaps), dtype=np.bool_)
     for number, gap in enumerate(gaps):
         state = bool(gap < (end if state else begin))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sec_lab.execution.loop import execute_skill
+from sec_lab.execution.loop import Outcome, execute_skill
 from sec_lab.execution.planning import Skill
 from sec_lab.worlds.katana.placing import Placing, placing_pose, placing_scene
 from sec_lab.worlds.katana.records import TABLE
@@ -78,7 +78,6 @@ def placing_trial(skill: Skill, placing: Placing, *, seed: int = PLACING_SCENES_
     except ValueError as error:
         return PlacingTrial(placing, number, len(scene.things), str(error))
     red, green = (done.truth.poses[name][-1] for name in ("red box", "green box"))
-    on_table = bool(done.truth.touching("red box", TABLE)[-1])
     off = red[:3, 3] - placing_pose(placing, scene)[0]
     yaw = float(np.arctan2(red[1, 0], red[0, 0]) - np.arctan2(green[1, 0], green[0, 0]))
     turned = (yaw + np.pi / 4) % (np.pi / 2) - np.pi / 4
@@ -89,7 +88,7 @@ def placing_trial(skill: Skill, placing: Placing, *, seed: int = PLACING_SCENES_
         len(scene.things),
         "",
         accepted=done.success,
-        placed=bool(done.truth.touching("red box", "green box")[-1]) and on_table == (placing == "beside"),
+        placed=is_placed(done, placing),
         n_attempts=done.n_attempts,
         first_failure=failures[0] if failures else "",
         gave_up=done.gave_up,
@@ -97,6 +96,18 @@ def placing_trial(skill: Skill, placing: Placing, *, seed: int = PLACING_SCENES_
         turned_off_deg=round(float(np.rad2deg(turned)), 1),
         simulated_s=round(done.time_s, 2),
     )
+
+
+def is_placed(done: Outcome, placing: str) -> bool:
+    """Whether the objects touch in the end, and the first stands on the table if and only if it should (truth).
+
+    Parameters
+    ----------
+    done : Outcome
+    placing : {"on", "beside"}
+    """
+    on_table = bool(done.truth.touching("red box", TABLE)[-1])
+    return bool(done.truth.touching("red box", "green box")[-1]) and on_table == (placing == "beside")
 
 
 def placing_trials(

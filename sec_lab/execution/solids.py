@@ -16,6 +16,12 @@ from sec_lab.worlds.katana.records import Floats
 _FIT_POINTS, _FOLLOW_POINTS = 1200, 300
 _FACE_M = 0.002
 _TURNS = 180
+_SIDES = ((1, -1), (0, 1), (1, 1), (0, -1))
+"""Axis and direction of the sides of a rectangle, in the order of its corners."""
+_RANGE_M, _PIXEL_M, _CORNER_M, _LEAST_ON_FACE, _FEW = 0.0003, 0.004, 0.004, 6, 3
+"""What the range of points in one plane may differ by; what a pixel covers of a level plane, at most, and as much again
+at the corners, where it may be another side that it passes; least number of points to say where a side is."""
+
 _STEPS = 12
 _STILL_M = 2e-5
 _WEAK = 1e-2
@@ -49,6 +55,9 @@ class Solid:
         Root mean square distance of what was seen from this.
     base_m : float, optional
         How high above the table it ends below; above 0 if it is held, or stands on something.
+    unsure_m : (k,) float64, optional
+        By how much each side of a prism, from its corner on, may lie elsewhere: half of what a pixel covers there if it
+        is hidden and runs along the rows of pixels.
     """
 
     centre_m: Floats
@@ -58,6 +67,7 @@ class Solid:
     profile: Floats
     error_m: float
     base_m: float = 0.0
+    unsure_m: Floats = field(default_factory=lambda: np.zeros(0))
     _normals: Floats = field(init=False, repr=False)
     _offsets: Floats = field(init=False, repr=False)
 
@@ -67,7 +77,7 @@ class Solid:
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         object.__setattr__(self, "_normals", normals)
         object.__setattr__(self, "_offsets", (normals * self.corners_m).sum(axis=1))
-        for array in (self.centre_m, self.corners_m, self.profile, self._normals, self._offsets):
+        for array in (self.centre_m, self.corners_m, self.profile, self.unsure_m, self._normals, self._offsets):
             array.setflags(write=False)
 
     @property
@@ -83,6 +93,28 @@ class Solid:
         height_m : float or array of float64
         """
         return np.asarray(np.sqrt(np.maximum(np.polyval(self.profile, height_m), 0.0)))
+
+    @property
+    def middle_m(self) -> float:
+        """Height of the middle of its volume above where it stands."""
+        if not self.is_round:
+            return (self.top_m - self.base_m) / 2
+        heights = np.linspace(0, self.top_m - self.base_m, _HEIGHTS)
+        area = self.radius_m(heights) ** 2
+        return float((heights * area).sum() / area.sum())
+
+    def unsure_towards_m(self, point_m: Floats) -> float:
+        """By how much the side that faces a point may lie elsewhere.
+
+        Parameters
+        ----------
+        point_m : (2,) float64
+            In the plane.
+        """
+        if not len(self.unsure_m):
+            return 0.0
+        own = (point_m - self.centre_m) @ _turn(self.yaw_rad)
+        return float(self.unsure_m[(self._normals @ own - self._offsets).argmax()])
 
     def section_m(self, height_m: float | None = None) -> Floats:
         """Border at a height, or of all heights seen from above: (k, 2) float64, anticlockwise.
@@ -143,7 +175,26 @@ def follow(solid: Solid, points_m: Floats) -> Solid:
         middle = (points[:, :2].min(axis=0) + points[:, :2].max(axis=0)) / 2
         tries = [replace(solid, centre_m=middle, yaw_rad=solid.yaw_rad + turn) for turn in np.arange(-0.8, 0.81, 0.2)]
         found = min([found, *(_settled(one, points) for one in tries)], key=lambda one: one.error_m)
-    return found
+    return _holding(found, points_m) if len(found.corners_m) == len(_SIDES) and found.error_m < _RANGE_M else found
+
+
+def _holding(solid: Solid, points: Floats) -> Solid:
+    """Moved so that all of what is seen lies in it.
+
+    Where something hides the side that says where it is, its top's outline still does: a few points, which the fit to
+    all of them does not heed. What stands askew is left as it is.
+    """
+    own = (points[:, :2] - solid.centre_m) @ _turn(solid.yaw_rad)
+    beyond = own @ solid._normals.T - solid._offsets
+    out = np.partition(beyond, -_FEW, axis=0)[-_FEW]
+    step = np.zeros(2)
+    for side in (0, 1):
+        one, other = out[side], out[side + 2]
+        if max(one, other) > 0:
+            # Towards what is outside, but not so far that as much is outside opposite.
+            by = (one - other) / 2 if one + other > 0 else max(one, 0.0) - max(other, 0.0)
+            step += by * solid._normals[side]
+    return replace(solid, centre_m=solid.centre_m + _turn(solid.yaw_rad) @ step)
 
 
 def raised(solid: Solid, by_m: float) -> Solid:
@@ -276,20 +327,28 @@ def _rectangle(points: Floats, hull: Floats, top: float, beside: Floats) -> Soli
     own, low, high = _in_box(sides, hull, yaw)
     outside = beside @ _turn(yaw)
     first_low, first_high = low.copy(), high.copy()
+    unsure = np.zeros(4)
     for axis, border, sign in _faces(first_low, first_high):
         other = 1 - axis
-        near = _of_face(own, axis, border, first_high - first_low)
-        beyond = sign * (outside[:, axis] - border)
-        facing = (outside[:, other] > first_low[other]) & (outside[:, other] < first_high[other])
-        facing &= (beyond > 0) & (beyond < _FACE_M)
         ends = low if sign < 0 else high
-        if near.any():
-            ends[axis] = float(np.median(own[near, axis]))
-        elif facing.any():
-            ends[axis] = border + sign * float(beyond[facing].min()) / 2
+        seen = _on_face(own, axis, border, sign)
+        if seen is not None:
+            ends[axis] = seen
+            continue
+        # The side is hidden: its edge lies between the last line of sight that meets the top and the first that does
+        # not. At the corners that may be for the other side.
+        beyond = sign * (outside[:, axis] - border)
+        facing = (outside[:, other] > first_low[other] + _CORNER_M) & (
+            outside[:, other] < first_high[other] - _CORNER_M
+        )
+        facing &= (beyond > -_RANGE_M) & (beyond < _PIXEL_M)
+        if facing.any():
+            half_way = max(float(beyond[facing].min()), 0.0) / 2
+            ends[axis] = border + sign * half_way
+            unsure[_SIDES.index((axis, sign))] = half_way
     half = (high - low) / 2
     corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=np.float64)
-    solid = Solid(_turn(yaw) @ ((low + high) / 2), top, yaw, corners, np.zeros(3), 0.0)
+    solid = Solid(_turn(yaw) @ ((low + high) / 2), top, yaw, corners, np.zeros(3), 0.0, unsure_m=unsure)
     return replace(solid, error_m=_error(solid, _some(points, _FIT_POINTS)))
 
 
@@ -297,6 +356,18 @@ def _in_box(sides: Floats, hull: Floats, yaw: float) -> tuple[Floats, Floats, Fl
     turn = _turn(yaw)
     own = hull @ turn
     return sides @ turn, own.min(axis=0), own.max(axis=0)
+
+
+def _on_face(own: Floats, axis: int, border: float, sign: int) -> float | None:
+    """Where a side is of which something is seen: what is seen of it is farthest out, in one plane; None if nothing."""
+    out = sign * own[:, axis]
+    if not len(out) or out.max() < sign * border - _PIXEL_M:
+        return None
+    near = out > out.max() - _RANGE_M
+    # What lies farthest out of a hidden side is the end of the one beside it: a line, not a plane.
+    if np.count_nonzero(near) < _LEAST_ON_FACE or np.ptp(own[near, 1 - axis]) < _PIXEL_M:
+        return None
+    return float(sign * np.median(out[near]))
 
 
 def _of_face(own: Floats, axis: int, border: float, size: Floats) -> NDArray[np.bool_]:

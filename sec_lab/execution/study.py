@@ -1,10 +1,10 @@
-"""Studies of the execution: many random scenes, and planted failures in some of them, as tables."""
+"""Study of the execution: many random scenes as a table; for planted failures see :mod:`sec_lab.execution.planted`."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,16 +13,14 @@ from sec_lab.execution.perception import perceive
 from sec_lab.execution.planning import Demonstrated, Skill, learn_skill
 from sec_lab.recognition import rate
 from sec_lab.worlds.katana.demonstrations import Demonstration
-from sec_lab.worlds.katana.records import Fault, Scene, Thing
+from sec_lab.worlds.katana.records import Scene, Thing
 from sec_lab.worlds.katana.scenes import random_scene
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Failure = Literal["slips", "missed", "wrong object", "removed"]
-SEED, N_SCENES, N_PLANTED = 2016, 100, 6
+SEED, N_SCENES = 2018, 100
 
-_MISSES_BY_M = 0.09
 _BINS_DEG = (0.0, 15.0, 30.0, 45.0)
 
 
@@ -71,40 +69,6 @@ class Trial:
     second_diagonal_deg: float = 0.0
     pushed_away_mm: float = 0.0
     simulated_s: float = 0.0
-
-
-@dataclass(frozen=True)
-class PlantedTrial:
-    """One failure planted in a random scene.
-
-    Parameters
-    ----------
-    number : int
-        Of the scene.
-    kind : str
-    thing : str
-        Whom it happens to.
-    rule : str
-        At which it has to be recognised.
-    recognised_at : str
-        Rule of the first verdict of the first attempt that disagrees; empty if there was none.
-    why : str
-        What that verdict said.
-    n_attempts : int
-    accepted, touching : bool
-        The arm's own verdict and the truth after all attempts.
-    """
-
-    number: int
-    kind: str
-    thing: str
-    rule: str
-    recognised_at: str
-    why: str
-    n_attempts: int
-    gave_up: str
-    accepted: bool
-    touching: bool
 
 
 def skill_of(demonstrations: Iterable[Demonstration]) -> Skill:
@@ -161,7 +125,7 @@ def trial(skill: Skill, *, seed: int, number: int) -> Trial:
         len(scene.things),
         "",
         accepted=done.success,
-        touching=_touching(done, red, green),
+        touching=end_touching(done, red, green),
         n_attempts=done.n_attempts,
         first_failure=failures[0] if failures else "",
         gave_up=done.gave_up,
@@ -170,54 +134,6 @@ def trial(skill: Skill, *, seed: int, number: int) -> Trial:
         second_diagonal_deg=second_deg,
         pushed_away_mm=round(float(1000 * np.hypot(*moved)), 1),
         simulated_s=round(done.time_s, 2),
-    )
-
-
-def planted_trial(skill: Skill, kind: Failure, *, seed: int, number: int) -> PlantedTrial:
-    """A push in one random scene in which something goes wrong in the first attempt.
-
-    Parameters
-    ----------
-    skill : Skill
-    kind : {"slips", "missed", "wrong object", "removed"}
-        The first object slips away half-way; the arm comes down 9 cm aside; it goes to the second object instead of the
-        first; somebody takes the first object away (or the second, in scenes of an odd number).
-    seed, number : int
-        Of the scene.
-
-    Raises
-    ------
-    ValueError
-        If the kind is unknown, or the scene is refused.
-    """
-    if kind not in get_args(Failure):
-        raise ValueError(f"kind: expected one of {get_args(Failure)}, got {kind!r}")
-    scene = random_scene(seed, number=number)
-    red, green = scene.things[:2]
-    touch = f"{{{', '.join(sorted((skill.first, skill.prime)))}}} N→T"
-    bring = f"{{{', '.join(sorted((skill.first, skill.second)))}}} N→T"
-    way = np.array(green.p_W_m[:2]) - np.array(red.p_W_m[:2])
-    aside = _MISSES_BY_M * np.array([-way[1], way[0]]) / np.hypot(*way) * (1 if number % 2 else -1)
-    taken = green if number % 2 else red
-    fault, thing, rule = {
-        "slips": (Fault("slips", "bring", red.name), red, bring),
-        "missed": (Fault("missed", "over", offset_m=(float(aside[0]), float(aside[1]))), red, touch),
-        "wrong object": (Fault("wrong object", "over", green.name, red.name), green, touch),
-        "removed": (Fault("removed", "bring", taken.name), taken, bring),
-    }[kind]
-    done = execute_skill(scene, skill, fault=fault)
-    wrong = [verdict for verdict in done.verdicts if verdict.attempt == 0 and not verdict.agrees]
-    return PlantedTrial(
-        number,
-        kind,
-        thing.name,
-        rule,
-        wrong[0].rule if wrong else "",
-        wrong[0].why if wrong else "",
-        done.n_attempts,
-        done.gave_up,
-        done.success,
-        _touching(done, red, green),
     )
 
 
@@ -233,24 +149,7 @@ def trials(skill: Skill, *, seed: int = SEED, n: int = N_SCENES, n_jobs: int = 1
     n_jobs : int, optional
         How many at a time, as in :class:`joblib.Parallel`; the table does not depend on it.
     """
-    return _table([partial(trial, skill, seed=seed, number=number) for number in range(n)], n_jobs=n_jobs)
-
-
-def planted_trials(skill: Skill, *, seed: int = SEED, n: int = N_PLANTED, n_jobs: int = 1) -> "pd.DataFrame":
-    """All kinds of failures in the first random scenes, one row each; see :class:`PlantedTrial`.
-
-    Parameters
-    ----------
-    skill : Skill
-    seed : int, optional
-    n : int, optional
-        In how many scenes.
-    n_jobs : int, optional
-        As for :func:`trials`.
-    """
-    kinds: tuple[Failure, ...] = get_args(Failure)
-    tasks = [partial(planted_trial, skill, kind, seed=seed, number=number) for number in range(n) for kind in kinds]
-    return _table(tasks, n_jobs=n_jobs)
+    return table_of([partial(trial, skill, seed=seed, number=number) for number in range(n)], n_jobs=n_jobs)
 
 
 def scene_rates(table: "pd.DataFrame") -> "pd.DataFrame":
@@ -288,41 +187,7 @@ def scene_rates(table: "pd.DataFrame") -> "pd.DataFrame":
         "rejected though touching": (int((touching & ~accepted).sum()), len(done)),
         "in the first attempt": (int((touching & (done["n_attempts"] == 1)).sum()), len(table)),
     }
-    return _rates(counts)
-
-
-def planted_rates(table: "pd.DataFrame") -> "pd.DataFrame":
-    """Counts of :func:`planted_trials` for each kind, with their Wilson intervals of 95 %.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        See :func:`scene_rates`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row each: recognised at its move, by kind and in all; touching after further attempts (of those in which
-        nothing was taken away); verdict right in the end.
-    """
-    right = table["recognised_at"] == table["rule"]
-    there = table[table["kind"] != "removed"]
-    counts = {
-        **{
-            f"recognised at its move: {kind}": (
-                int(right[table["kind"] == kind].sum()),
-                int((table["kind"] == kind).sum()),
-            )
-            for kind in dict.fromkeys(table["kind"])
-        },
-        "recognised at its move": (int(right.sum()), len(table)),
-        "touching after further attempts": (int(there["touching"].astype(bool).sum()), len(there)),
-        "verdict right in the end": (
-            int((table["touching"].astype(bool) == table["accepted"].astype(bool)).sum()),
-            len(table),
-        ),
-    }
-    return _rates(counts)
+    return rates_of(counts)
 
 
 def pushed_away(table: "pd.DataFrame") -> "pd.DataFrame":
@@ -357,7 +222,14 @@ def pushed_away(table: "pd.DataFrame") -> "pd.DataFrame":
     return pd.DataFrame(rows)
 
 
-def _rates(counts: dict[str, tuple[int, int]]) -> "pd.DataFrame":
+def rates_of(counts: dict[str, tuple[int, int]]) -> "pd.DataFrame":
+    """Counts as a table, each with its Wilson interval of 95 %; those of nothing are left out.
+
+    Parameters
+    ----------
+    counts : dict of str to (int, int)
+        How many, of how many.
+    """
     import pandas as pd
 
     rows = []
@@ -377,7 +249,15 @@ def _rates(counts: dict[str, tuple[int, int]]) -> "pd.DataFrame":
     return pd.DataFrame(rows).set_index("what")
 
 
-def _table(tasks: "list[partial[Any]]", *, n_jobs: int) -> "pd.DataFrame":
+def table_of(tasks: "list[partial[Any]]", *, n_jobs: int) -> "pd.DataFrame":
+    """A row for each task, which gives a record; the same for any number of jobs.
+
+    Parameters
+    ----------
+    tasks : list of functools.partial
+    n_jobs : int
+        As in :class:`joblib.Parallel`.
+    """
     import sys
 
     import pandas as pd
@@ -390,7 +270,14 @@ def _table(tasks: "list[partial[Any]]", *, n_jobs: int) -> "pd.DataFrame":
     )
 
 
-def _touching(done: Outcome, red: Thing, green: Thing) -> bool:
+def end_touching(done: Outcome, red: Thing, green: Thing) -> bool:
+    """Whether two things touch in the end (truth).
+
+    Parameters
+    ----------
+    done : Outcome
+    red, green : Thing
+    """
     return bool(done.truth.touching(red.name, green.name)[-1])
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from sec_lab.execution.loop import Verdict
 from sec_lab.execution.pushing import push, pushing_skill
 from sec_lab.execution.skill import Skill, Step
-from sec_lab.viz.arm import ArmFilm, ArmRecording
+from sec_lab.viz.arm import ArmFilm, ArmRecording, release_viewers
 from sec_lab.viz.arm_process import STOP, Pushed
 from sec_lab.worlds.katana import Fault, Glance, Move, Scene
 
@@ -73,6 +73,7 @@ def main() -> None:
                 if request[0] != "look":
                     # Drake's diagrams, and with them the viewer and its server, hang in cycles.
                     gc.collect()
+                    release_viewers()
 
 
 if __name__ == "__main__":

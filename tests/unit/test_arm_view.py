@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from urllib.request import urlopen
 
@@ -87,3 +88,36 @@ def test_the_live_view_is_for_this_machine_only() -> None:
     before = live.scene.things[0].p_W_m
     live.move(pushing_program(SCENE)[0])
     assert live.scene.things[0].p_W_m == pytest.approx(before, abs=1e-3)
+    live.close()
+    live.close()
+    with pytest.raises(ValueError, match="expected an open one"):
+        live.move()
+
+
+_DROPPED = """
+import gc, threading, time
+from sec_lab.viz.arm import LiveArm
+from sec_lab.worlds.katana.demonstrations import demonstration_scene
+
+def drop(things):
+    while things:
+        things.pop()
+    gc.collect()
+
+scene = demonstration_scene(2012, 0)
+in_a_cycle, kept = [LiveArm(scene), LiveArm(scene)], LiveArm(scene)
+in_a_cycle[0].itself = in_a_cycle[0]
+made = [thread for thread in threading.enumerate() if thread.name == "live arm"]
+other = threading.Thread(target=drop, args=(in_a_cycle,))
+other.start()
+other.join()
+for thread in made[:2]:
+    thread.join(20)
+print(len(made), sum(thread.is_alive() for thread in made), len(kept.scene.things) == len(scene.things))
+"""
+
+
+def test_a_live_view_can_be_dropped_in_any_thread() -> None:
+    """Drake ends the process if its viewer is dropped in another thread than it was made in."""
+    done = subprocess.run([sys.executable, "-c", _DROPPED], capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout.split()) == (0, ["3", "1", "True"]), done.stderr

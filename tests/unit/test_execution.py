@@ -3,6 +3,7 @@
 import hashlib
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -23,20 +24,13 @@ from sec_lab.execution.loop import execute_skill, loose
 from sec_lab.execution.macro import macro
 from sec_lab.execution.perception import SeenThing, Watcher, perceive, things_in
 from sec_lab.execution.planning import Rule, SceneError, Skill, check_scene, plan
-from sec_lab.execution.study import (
-    N_PLANTED,
-    N_SCENES,
-    SEED,
-    planted_rates,
-    pushed_away,
-    scene_rates,
-    skill_of,
-    trial,
-)
+from sec_lab.execution.planted import Failure, planted_rates
+from sec_lab.execution.pushing import pushing_skill
+from sec_lab.execution.study import SEED, pushed_away, scene_rates, trial
 from sec_lab.recording import Frame
 from sec_lab.worlds.katana import Fault, Move, Run, UnreachableError, camera_at, example_scene, view
 from sec_lab.worlds.katana.scenes import BLUE, reach_of, thing
-from sec_lab.worlds.katana.stored import read_demonstration, read_demonstrations
+from sec_lab.worlds.katana.stored import read_demonstration
 
 DATASETS = Path(__file__).parents[2] / "datasets"
 DEMONSTRATIONS, SCENES = DATASETS / "katana_pushing", DATASETS / "katana_scenes"
@@ -166,8 +160,8 @@ def test_watcher_needs_range_and_frames() -> None:
 
 @pytest.fixture(scope="module")
 def skill() -> Skill:
-    """Of all ten demonstrations, as for the stored tables."""
-    return skill_of(read_demonstrations(DEMONSTRATIONS))
+    """Of the GraphML of all ten demonstrations, as for the stored tables."""
+    return pushing_skill()
 
 
 def test_the_model_is_that_of_the_thesis(skill: Skill) -> None:
@@ -274,26 +268,37 @@ def test_a_rule_that_no_move_follows_from_is_refused(skill: Skill) -> None:
 
 
 def test_a_loose_contact_is_judged_by_the_gap_while_it_was_none(skill: Skill) -> None:
-    """Some tenths of a millimetre more than while the one pushed the other is loose, however large they seem to be."""
+    """Some tenths of a millimetre more than while the one pushed the other is loose."""
 
     class Seen:
-        def __init__(self, gap_m: float) -> None:
-            self.gap_m = gap_m
+        def __init__(self, gap_m: float, unsure_m: float) -> None:
+            self.gap_m, self.unsure_m = gap_m, unsure_m
 
         def last_gap_m(self, one: str, other: str) -> float:
             assert {one, other} == {"red box", "green box"}
             return self.gap_m
 
-    def judge(gap_m: float, pressed_m: float | None) -> str:
-        return loose(Seen(gap_m), skill, pressed_m=pressed_m)  # type: ignore[arg-type]
+        def last_unsure_m(self, one: str, other: str) -> float:
+            assert {one, other} == {"red box", "green box"}
+            return self.unsure_m
 
-    assert judge(0.0002, 0.0) == judge(0.0012, 0.001) == judge(-0.0002, -0.001) == judge(0.0003, None) == ""
+    def judge(gap_m: float, pressed_m: float | None, *, unsure_m: float = 0.0, spare_m: float = 0.0) -> str:
+        return loose(Seen(gap_m, unsure_m), skill, pressed_m=pressed_m, spare_m=spare_m)  # type: ignore[arg-type]
+
+    assert judge(0.0002, 0.0) == judge(0.0004, 0.0002) == judge(0.0003, None) == ""
     assert judge(0.0007, 0.0) == "{green box, red box}: expected a gap of at most 0.3 mm, got 0.7 mm"
-    assert judge(0.0014, 0.001) != ""
-    # Both look larger than they are, and have sprung apart.
-    assert judge(0.0002, -0.0015) == "{green box, red box}: expected a gap of at most -0.3 mm, got 0.2 mm"
+    # A side that is hidden may lie elsewhere by half of what a pixel covers, and so look apart, or as if within.
+    assert judge(0.0012, 0.001, unsure_m=0.001) == ""
+    assert judge(0.0012, 0.001) == "{green box, red box}: expected a gap of at most 0.5 mm, got 1.2 mm"
+    assert (
+        judge(0.0002, -0.001, unsure_m=0.001) == "{green box, red box}: expected a gap of at most -0.7 mm, got 0.2 mm"
+    )
+    # What gives way while it is pressed on, and springs back, says nothing of how far off a gap looks.
+    assert judge(0.0002, -0.002) == judge(-0.0006, -0.002) == ""
     # What looked apart by centimetres while it was pushed was no contact.
     assert judge(0.01, 0.01) != ""
+    # While the arm is near, half a millimetre more is allowed.
+    assert judge(0.0007, 0.0, spare_m=0.0005) == ""
 
 
 def test_a_move_out_of_reach_on_the_way_is_a_failure_and_no_error(
@@ -328,7 +333,7 @@ def test_after_a_failure_the_arm_tries_again_from_what_it_sees(skill: Skill) -> 
     ("fault", "rule"),
     [
         (Fault("slips", "bring", "red box", share=0.2), "{green box, red box} N→T"),
-        (Fault("removed", "bring", "red box"), "{green box, red box} N→T"),
+        (Fault("springs back", "leave", "red box", offset_m=(-0.0009, 0.0018)), "{red box, robot arm} T→N"),
         (Fault("wrong object", "over", "green box", "red box"), "{red box, robot arm} N→T"),
     ],
 )
@@ -380,20 +385,22 @@ def test_counts_of_the_studies() -> None:
     assert pushed_away(scenes)[["n", "largest_mm"]].iloc[0].tolist() == [1, 2.0]
     planted = pd.DataFrame(
         {
-            "kind": ["slips", "removed"],
-            "rule": ["a", "b"],
-            "recognised_at": ["a", "c"],
-            "touching": [True, False],
-            "accepted": [True, False],
+            "kind": ["slips", "removed", "slips"],
+            "attempt": [2, 1, 0],
+            "rule": ["a", "b", "a"],
+            "recognised_at": ["a", "c", ""],
+            "reached": [True, False, True],
+            "accepted": [True, False, False],
         }
     )
     counts = planted_rates(planted)
-    assert counts["n"].to_dict() == {
-        "recognised at its move: slips": 1,
-        "recognised at its move: removed": 0,
-        "recognised at its move": 1,
-        "touching after further attempts": 1,
-        "verdict right in the end": 2,
+    assert {what: (int(row["n"]), int(row["of"])) for what, row in counts.iterrows()} == {
+        "came to pass": (2, 3),
+        "recognised at its move: slips": (1, 1),
+        "recognised at its move: removed": (0, 1),
+        "recognised at its move": (1, 2),
+        "reached after further attempts": (1, 1),
+        "verdict right in the end": (2, 3),
     }
 
 
@@ -403,10 +410,13 @@ def test_the_tables_are_what_their_readme_says() -> None:
         digest, name = line.split()
         assert hashlib.sha256((SCENES / name).read_bytes()).hexdigest() == digest
     scenes = pd.read_csv(SCENES / "scenes.csv", keep_default_na=False)
-    assert scenes["number"].tolist() == list(range(N_SCENES))
+    assert scenes["number"].tolist() == list(range(len(scenes)))
+    assert f"the first {len(scenes)} scenes" in (SCENES / "README.md").read_text(encoding="utf-8")
     planted = pd.read_csv(SCENES / "planted.csv", keep_default_na=False)
-    assert set(planted["kind"]) == {"slips", "missed", "wrong object", "removed"}
-    assert len(planted) == 4 * N_PLANTED
+    assert set(planted["kind"]) == set(get_args(Failure))
+    assert set(zip(planted["number"], planted["kind"], strict=True)) == {
+        (number, kind) for number in range(planted["number"].max() + 1) for kind in get_args(Failure)
+    }
 
 
 @pytest.mark.parametrize("arguments", [["--seed", "-1"], ["--number", "0"]])

@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 Point = tuple[float, float, float]
 Form = Literal["box", "sphere", "cone"]
 Gripper = Literal["open", "ajar", "closed"]
-FaultKind = Literal["slips", "missed", "wrong object", "removed"]
+FaultKind = Literal["slips", "missed", "wrong object", "removed", "springs back", "drops"]
 
 ARM, TABLE = "robot arm", "table"
 """Names of the segments that every scene has; the arm's is its coloured tip (§2.10.1)."""
@@ -248,9 +248,10 @@ class Fault:
 
     Parameters
     ----------
-    kind : {"slips", "missed", "wrong object", "removed"}
+    kind : {"slips", "missed", "wrong object", "removed", "springs back", "drops"}
         The thing is drawn sideways out of the arm's way by a short force; the arm goes ``offset_m`` beside where it
-        should; it goes to the thing instead of where it should (``instead_of``); somebody takes the thing away.
+        should; it goes to the thing instead of where it should (``instead_of``); somebody takes the thing away; it
+        stands ``offset_m`` from where it was; the fingers lose their hold of it.
     move : str
         Name of the move in which it happens. The arm's own errors begin there and end once it is high up again.
     thing : str, optional
@@ -260,7 +261,7 @@ class Fault:
     share : float, optional
         Of the move, after which it happens.
     offset_m : tuple of float, optional
-        Of an arm that misses, in the plane.
+        Of an arm that misses, or of a thing that springs back, in the plane.
 
     Raises
     ------

@@ -17,6 +17,7 @@ from sec_lab.worlds.katana.records import ARM, TABLE, Fault, Floats, Gripper, Mo
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
+    from pydrake.systems.framework import Diagram
 
 FRAMES_PER_SECOND = 20.0
 _STEPS_A_FRAME = round(1 / FRAMES_PER_SECOND / STEP_S)
@@ -26,6 +27,7 @@ _HAIR_M = 0.0005
 _FAR_AWAY_M = (3.0, 0.0, -2.0)
 _SLIP_M, _SLIP_WEIGHTS = 0.06, 2.0
 """How far, and with how many times its weight, a thing is drawn aside; it slides on from there."""
+_LOSES_HOLD_STEPS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +119,7 @@ class Run:
             if name != other_name
         ]
         self._fault: Fault | None = fault
+        self._has_failed = False
         self._before_move = before_move
         self._drawn: tuple[str, Floats] | None = None
         self._wanted: Floats | None = None
@@ -226,6 +229,25 @@ class Run:
         """
         return tuple(moment.tip for moment in self._moments[first:])
 
+    def joints_since(self, first: int) -> tuple[Floats, ...]:
+        """What the joints' own sensors said, frame by frame from a number on; (7,) float64 each, the fingers last.
+
+        Parameters
+        ----------
+        first : int
+        """
+        return tuple(moment.joints for moment in self._moments[first:])
+
+    @property
+    def diagram(self) -> "Diagram":
+        """What is simulated."""
+        return self._bench.diagram
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether what goes wrong has begun to (truth)."""
+        return self._fault is not None and self._has_failed
+
     def move(self, move: Move) -> None:
         """Make one move, filming, and rest a little.
 
@@ -240,7 +262,8 @@ class Run:
         """
         if self._before_move is not None:
             self._before_move(move)
-        fault = self._fault if self._fault is not None and self._fault.move == move.name else None
+        armed = self._fault is not None and not self._has_failed
+        fault = self._fault if armed and self._fault is not None and self._fault.move == move.name else None
         offset = self._offset if fault is None else self._offset + self._error(fault)
         # The arm's own errors are those of one visit to the table.
         if offset.any() and self._was_low and move.to_m[2] >= LOW_M:
@@ -252,7 +275,7 @@ class Run:
         if move.gripper is not None:
             self._bench.plant.SetConstraintActiveStatus(self._plant_context, self._bench.gear, status=True)
         if fault is not None:
-            self._fault = None
+            self._has_failed = True
         self._follow(path, fault)
         self.move_ends.append(len(self._moments) - 1)
 
@@ -285,6 +308,12 @@ class Run:
         v = np.gradient(q, STEP_S, axis=0)
         a = np.gradient(v, STEP_S, axis=0)
         at = -1 if fault is None else int(fault.share * max(path.n_motion - 1, 0))
+        if fault is not None and fault.kind == "drops":
+            # The gear does not hold them either.
+            self._bench.plant.SetConstraintActiveStatus(self._plant_context, self._bench.gear, status=True)
+            share = np.clip(np.arange(len(q) - at - 1) / _LOSES_HOLD_STEPS, 0, 1)[:, None]
+            q[at + 1 :, 5:] = (1 - share) * q[at, 5:] + share * FINGER_RAD["open"]
+            path.q_rad[at:, 5:] = q[at + 1 :][: len(path.q_rad) - at, 5:]
         for step in range(1, len(q)):
             if step - 1 == at:
                 assert fault is not None
@@ -376,6 +405,10 @@ class Run:
             away[:3, 3] = _FAR_AWAY_M
             self._place(str(fault.thing), away)
             # Nothing holds it there; nobody looks where it falls.
+        elif fault.kind == "springs back":
+            pose = self._poses()[str(fault.thing)].copy()
+            pose[:2, 3] += fault.offset_m
+            self._place(str(fault.thing), pose)
         elif fault.kind == "slips":
             way = path.tip_m[-1] - path.tip_m[0]
             length = np.hypot(way[0], way[1])
