@@ -185,8 +185,8 @@ def with_coloured_parts(
 ) -> Labels:
     """Regions with a part of another colour in two: what a cup holds, the pages of a closed book.
 
-    What is large and thick is a part. What is small is one if it lies within its region and is of another hue, which no
-    shadow makes: lower than what is around it, or a strip. Rims, bands, caps and painted marks stay.
+    What is large and thick is a part. What is small is one if it lies within its region and is of another chroma, which
+    no soft shade makes: lower than what is around it, or a strip. Rims, bands, caps and painted marks stay.
     """
     import cv2
 
@@ -292,6 +292,6 @@ def _is_ground(lab: NDArray[np.uint8], piece: NDArray[np.bool_], labels: Labels)
 
 
 def _hue_distance(lab: NDArray[np.uint8], one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
-    """How far two parts differ in chroma, whatever light falls on them."""
+    """How far two parts differ in chroma, which a soft shade changes little."""
     chroma = [np.median(lab[where][:, 1:].astype(np.float32), axis=0) for where in (one, other)]
     return float(np.hypot(*(chroma[0] - chroma[1])))
