@@ -77,4 +77,4 @@ def test_a_push_by_hand(lab: Lab, screenshot: Callable[..., Path]) -> None:
     recording.evaluate("(node) => node.scrollIntoView()")
     expect(recording.content_frame.locator("canvas").first).to_be_attached(timeout=60_000)
     expect(live).to_have_count(0)
-    expect(page.locator(".jp-OutputArea-output").filter(has_text="42")).to_be_visible()
+    expect(page.locator(".jp-RenderedText pre").get_by_text("42", exact=True)).to_be_visible()
