@@ -75,7 +75,11 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
             short = rests[label] and segment.rests < p.pause_frames
             pauses[label] = at_border and segment.has_moved and short
         touching = {pair: _touching(hints, pair) for pair in combinations(sorted(places), 2)}
-        sure = {(i, j): not (hidden[i] or hidden[j]) and pauses[i] == pauses[j] for i, j in touching}
+        ground = max(sorted(places), key=lambda label: area[label])
+        sure = {
+            (i, j): not (hidden[i] or hidden[j] or (j == ground and pauses[i]) or (i == ground and pauses[j]))
+            for i, j in touching
+        }
         counted = dict(touching)
         if p.contact_by_motion:
             counted.update({pair: 0.0 for pair in touching if rests[pair[0]] != rests[pair[1]]})

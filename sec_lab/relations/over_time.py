@@ -236,7 +236,8 @@ class _State:
         touching, sure = seen.touching, seen.sure
         hidden = seen.pixels < p.visible_share * self.largest[slots]
         sure &= ~(hidden[:, None] | hidden)
-        sure &= ~(pauses[:, None] ^ pauses)
+        ground = np.arange(len(slots)) == seen.pixels.argmax()
+        sure &= ~((pauses[:, None] & ground) | (ground[:, None] & pauses))
         if known and p.contact_by_motion:
             touching = np.where(rests[:, None] != rests, 0.0, touching)
         if known and p.carried:

@@ -58,8 +58,8 @@ class TimeParameters:
         rules below are off unless motion is given with the frames.
     pause_frames : int
         What reaches in from the border of the picture and has moved only pauses when it stands still for less than so
-        many frames, and a pause changes no contact with what rests: an arm that pours does not come to lie on the table
-        below. 0: off.
+        many frames, and a pause begins and ends no contact with the background: an arm that pours does not come to lie
+        on the table below. 0: off.
     freeze : bool
         Two segments that both rest, the smaller one next to something that moves and may hide it, keep their relation.
         Off by default: it keeps wrong relations as well, until the hand has gone, and what it is good for the next rule

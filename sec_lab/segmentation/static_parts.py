@@ -143,9 +143,8 @@ def with_things_on_top(
 
 
 def _touch(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
-    import cv2
 
-    return bool((cv2.dilate(one.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)[other].any())
+    return bool(_dilated(one, 3)[other].any())
 
 
 def _is_like(
@@ -185,8 +184,8 @@ def with_coloured_parts(
 ) -> Labels:
     """Regions with a part of another colour in two: what a cup holds, the pages of a closed book.
 
-    What is large and thick is a part. What is small is one if it lies within its region and is of another chroma, which
-    no soft shade makes: lower than what is around it, or a strip. Rims, bands, caps and painted marks stay.
+    What is large and thick is a part. What is small is one if it lies within its region and is of another hue, which
+    no shade makes: lower than what is around it, or a strip. Rims, bands, caps and painted marks stay.
     """
     import cv2
 
@@ -244,9 +243,7 @@ def _is_strip(part: NDArray[np.bool_]) -> bool:
 
 def _is_lower(rise: Floats, piece: NDArray[np.bool_], region: NDArray[np.bool_]) -> bool:
     """Whether a piece lies lower than what is around it in its region, as in a cup."""
-    import cv2
-
-    near = [cv2.dilate(piece.astype(np.uint8), np.ones((side, side), np.uint8)) > 0 for side in (3, 9)]
+    near = [_dilated(piece, side) for side in (3, 9)]
     heights = [rise[where][np.isfinite(rise[where])] for where in (piece, near[1] & ~near[0] & region)]
     if any(len(known) < 10 for known in heights):
         return False
@@ -255,9 +252,7 @@ def _is_lower(rise: Floats, piece: NDArray[np.bool_], region: NDArray[np.bool_])
 
 def _at_border(piece: NDArray[np.bool_], labels: Labels) -> bool:
     """Whether the background is next to much of a piece."""
-    import cv2
-
-    around = (cv2.dilate(piece.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0) & ~piece
+    around = _dilated(piece, 3) & ~piece
     return bool((labels[around] == BACKGROUND).mean() >= _AT_BORDER)
 
 
@@ -274,7 +269,7 @@ def _is_band(piece: NDArray[np.bool_], region: NDArray[np.bool_]) -> bool:
     import cv2
 
     # A region reaches a few pixels beyond the thing that it is of, on both ends of a band.
-    cut = cv2.dilate(piece.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    cut = _dilated(piece, 7)
     n, _, statistics, _ = cv2.connectedComponentsWithStats((region & ~cut).astype(np.uint8), connectivity=4)
     sides = np.sort(statistics[1:n, cv2.CC_STAT_AREA])[::-1]
     return len(sides) > 1 and bool(sides[1] >= _A_SIDE * region.sum())
@@ -282,16 +277,23 @@ def _is_band(piece: NDArray[np.bool_], region: NDArray[np.bool_]) -> bool:
 
 def _is_ground(lab: NDArray[np.uint8], piece: NDArray[np.bool_], labels: Labels) -> bool:
     """Whether a piece at the border of a region is the background around, lit as it is or in a shade."""
-    import cv2
-
     if not _at_border(piece, labels):
         return False
-    near = (cv2.dilate(piece.astype(np.uint8), np.ones((31, 31), np.uint8)) > 0) & (labels == BACKGROUND)
+    near = _dilated(piece, 31) & (labels == BACKGROUND)
     brighter = float(np.median(lab[piece][:, 0])) - float(np.median(lab[near][:, 0]))
     return brighter < _BRIGHTER and _hue_distance(lab, piece, near) < _SAME_HUE
 
 
+def _dilated(part: NDArray[np.bool_], side_px: int) -> NDArray[np.bool_]:
+    """A part with all that a square of so many pixels, centred on one of its own, covers."""
+    import cv2
+
+    return np.asarray(cv2.dilate(part.astype(np.uint8), np.ones((side_px, side_px), np.uint8)) > 0)
+
+
 def _hue_distance(lab: NDArray[np.uint8], one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
-    """How far two parts differ in chroma, which a soft shade changes little."""
-    chroma = [np.median(lab[where][:, 1:].astype(np.float32), axis=0) for where in (one, other)]
-    return float(np.hypot(*(chroma[0] - chroma[1])))
+    """How far two parts differ in chroma in the light of the darker one: a shade scales L* + 16, a* and b* alike."""
+    lightness, *chroma = np.array([np.median(lab[where], axis=0) for where in (one, other)]).T
+    light = lightness + 16 * 255 / 100
+    scale = light.min() / light
+    return float(np.hypot(*(np.subtract(*((values - 128) * scale)) for values in chroma)))

@@ -170,6 +170,8 @@ class TestPartsOfAnotherHue:
         found, _ = self.segments(Block((48, 60), self.WHITE, 16, 18), lower=lower)
         assert set(np.unique(found)) == parts
 
-    def test_a_soft_shade_is_no_part(self) -> None:
-        found, _ = self.segments(Block((66, 60), (150, 32, 28), 8, 46))
+    @pytest.mark.parametrize("shade", [0.8, 0.6, 0.4])
+    def test_a_shade_of_the_same_hue_is_no_part(self, shade: float) -> None:
+        dark = tuple(round(shade * value) for value in RED)
+        found, _ = self.segments(Block((66, 60), dark, 8, 46))
         assert set(np.unique(found)) == {1, 2}

@@ -34,7 +34,7 @@ RULES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "contact by motion": ("rest_px", "contact_by_motion"),
         "carried things touch": ("carried",),
         "overlapping at rest only": ("kind_at_rest",),
-        "a pause changes nothing": ("pause_frames",),
+        "a pause is no contact": ("pause_frames",),
         "changes together": ("together_frames",),
     }
 )
