@@ -6,7 +6,7 @@ is chosen whose columns agree best, in their order (Eq. 2.7–2.9).
 """
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from itertools import pairwise
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sec_lab import _chain_kernels as kernels
+from sec_lab._one_to_one import one_to_one
 from sec_lab._packed_chains import PackedChains
 from sec_lab._packed_chains import check_comparable as check_comparable
 from sec_lab._pair_kernels import Chains, Pair, room_to_work
@@ -400,7 +401,7 @@ def permutations(match: Match, *, limit: int = 10_000) -> list[Permutation]:
     u, v = packed.n_columns.tolist()
     rows_a, rows_b = match.a.changing_rows, match.b.changing_rows
     found: list[Permutation] = []
-    for partners in _assignments(match.candidates):
+    for partners in one_to_one(match.candidates):
         if len(found) == limit:
             raise ValueError(f"permutations: expected at most {limit}, there are more")
         equal = packed.equal_entries(partners)
@@ -418,26 +419,6 @@ def _protect(record: object, *names: str) -> None:
         array = np.array(getattr(record, name))
         array.setflags(write=False)
         object.__setattr__(record, name, array)
-
-
-def _assignments(candidates: NDArray[np.bool_]) -> Iterator[list[tuple[int, int]]]:
-    """Every one-to-one choice of candidates in which no further row could be added."""
-    options = [np.flatnonzero(row).tolist() for row in candidates]
-    wanted_later = [set[int]().union(*options[i + 1 :]) for i in range(len(options))]
-
-    def extend(i: int, chosen: list[tuple[int, int]], taken: set[int]) -> Iterator[list[tuple[int, int]]]:
-        if i == len(options):
-            used = {row for row, _ in chosen}
-            if all(row in used or taken.issuperset(options[row]) for row in range(len(options))):
-                yield chosen
-            return
-        for j in options[i]:
-            if j not in taken:
-                yield from extend(i + 1, [*chosen, (i, j)], taken | {j})
-        if all(j in taken or j in wanted_later[i] for j in options[i]):
-            yield from extend(i + 1, chosen, taken)
-
-    return extend(0, [], set())
 
 
 def _fill(

@@ -1,18 +1,23 @@
-"""Whether the way of a plan is free: the hand and what it pushes keep clear of everything else that is seen (D8)."""
+"""The way home, and whether the way of a plan is free of everything else that is seen (D8)."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sec_lab.execution.solids import Solid, gap_between, gap_to_points
 from sec_lab.worlds.katana.kinematics import UnreachableError, hand_axes, joint_angles
-from sec_lab.worlds.katana.records import Floats, Move
+from sec_lab.worlds.katana.records import Floats, Move, Point
 
 HAND_M, HAND_LONG_M = 0.036, 0.20
 """Radius and length of the hand with its fingers ajar."""
 
+FREE_M_S = 0.3
+"""Speed high up, where nothing is in the way."""
+
+_NEAR_COLUMN_M, _OUT_M = 0.20, 0.26
 _MARGIN_M = 0.006
 _PLACES = 9
 
@@ -70,3 +75,27 @@ def _hand(tip_m: Floats) -> Floats:
     except UnreachableError:
         return tip_m[None]
     return np.asarray(tip_m - np.linspace(0, HAND_LONG_M, 21)[:, None] * along)
+
+
+def way_home(from_m: ArrayLike, home_m: Point) -> tuple[Move, ...]:
+    """Moves from a place high up to a home (D8); near its own column the arm cannot rise, so it goes outwards first.
+
+    Parameters
+    ----------
+    from_m : (3,) array_like of float
+    home_m : tuple of float
+
+    Examples
+    --------
+    >>> [move.name for move in way_home((0.3, 0.0, 0.15), (-0.1, 0.3, 0.3))]
+    ['home']
+    >>> [move.name for move in way_home((0.12, 0.0, 0.15), (-0.1, 0.3, 0.3))]
+    ['out', 'home']
+    """
+    place = np.asarray(from_m, dtype=np.float64)
+    away = float(np.hypot(place[0], place[1]))
+    home = Move(home_m, name="home", speed_m_s=FREE_M_S)
+    if away >= _NEAR_COLUMN_M:
+        return (home,)
+    x, y = (_OUT_M / away * place[:2]).tolist()
+    return Move((x, y, float(place[2])), name="out", speed_m_s=FREE_M_S), home

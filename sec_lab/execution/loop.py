@@ -7,7 +7,7 @@ import numpy as np
 
 from sec_lab.codes import LETTER_OF, Relation
 from sec_lab.event_chain import EventChain
-from sec_lab.execution.macro import way_home
+from sec_lab.execution.corridor import way_home
 from sec_lab.execution.motion import Run, UnreachableError
 from sec_lab.execution.perception import TABLE, Perceived, Watcher
 from sec_lab.execution.planning import Skill, Step, plan, shifted, told

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from sec_lab.execution.anchors import PrimeMover, connection_vector, intersections, segment_length
+from sec_lab.execution.corridor import FREE_M_S, way_home
 from sec_lab.execution.grips import (
     CLEARANCE_M,
     FINGERS_BEYOND_M,
@@ -51,11 +51,10 @@ INSTRUCTIONS = (
 )
 """As the thesis has them; with the sixth goes: "(For pushing do this by cross-sectioning with object borders)."."""
 
-_NEAR_COLUMN_M, _OUT_M = 0.20, 0.26
 _ABOVE_M = 0.03
 """Between the fingers and the top of what they have let go of."""
 
-_FREE_M_S, _CARRY_M_S, _DOWN_M_S, _STAND_M_S = 0.3, 0.15, 0.1, 0.02
+_CARRY_M_S, _DOWN_M_S, _STAND_M_S = 0.15, 0.1, 0.02
 
 
 class MacroError(ValueError):
@@ -187,7 +186,7 @@ def first_segment(skill: Skill, system: System, rules: Sequence[Rule], grip: Gri
         return Segment(
             tuple(rules),
             (
-                Move(_at(outside, over), skill.hand.before, "over", facing, _FREE_M_S),
+                Move(_at(outside, over), skill.hand.before, "over", facing, FREE_M_S),
                 Move(_at(outside, height), name="down", speed_m_s=0.1),
                 Move(_at(touch, height), name="reach", speed_m_s=skill.speed_m_s),
             ),
@@ -196,7 +195,7 @@ def first_segment(skill: Skill, system: System, rules: Sequence[Rule], grip: Gri
     return Segment(
         tuple(rules),
         (
-            Move(_at(grip.take_m, above), skill.hand.before, "over", grip.take_facing_rad, _FREE_M_S),
+            Move(_at(grip.take_m, above), skill.hand.before, "over", grip.take_facing_rad, FREE_M_S),
             Move(_at(grip.take_m, grip.take_m[2]), None, "down", grip.take_facing_rad, _DOWN_M_S),
             Move(_at(grip.take_m, grip.take_m[2]), "closed", "grasp"),
         ),
@@ -344,29 +343,6 @@ def third_segment(
         )
     home = (Move(_at(away, over), name="up", speed_m_s=0.1), *way_home((*away, over), home_m))
     return Segment(tuple(parting), leave), Segment(tuple(leaving), home)
-
-
-def way_home(from_m: ArrayLike, home_m: Point) -> tuple[Move, ...]:
-    """Moves from a place high up to a home (D8); near its own column the arm cannot rise, so it goes outwards first.
-
-    Parameters
-    ----------
-    from_m : (3,) array_like of float
-    home_m : tuple of float
-
-    Examples
-    --------
-    >>> [move.name for move in way_home((0.3, 0.0, 0.15), (-0.1, 0.3, 0.3))]
-    ['home']
-    >>> [move.name for move in way_home((0.12, 0.0, 0.15), (-0.1, 0.3, 0.3))]
-    ['out', 'home']
-    """
-    place = np.asarray(from_m, dtype=np.float64)
-    away = float(np.hypot(place[0], place[1]))
-    home = Move(home_m, name="home", speed_m_s=_FREE_M_S)
-    if away >= _NEAR_COLUMN_M:
-        return (home,)
-    return Move(_at(_OUT_M / away * place[:2], float(place[2])), name="out", speed_m_s=_FREE_M_S), home
 
 
 def macro(
