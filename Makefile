@@ -11,6 +11,8 @@ NBVAL := --nbval --nbval-current-env --nbval-cell-timeout=300
 # Nothing is fetched while one works: no news, no updates, no extensions.
 LAB := --LabApp.default_url=/lab/tree/notebooks --LabApp.news_url=None --LabApp.extension_manager=readonly \
        --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate
+# A file of tests at a time to each of two processes: a notebook's cells stay together and in order.
+SPREAD := --numprocesses=2 --dist=loadfile
 # Tests of every kind; folders that are not there are left out.
 TESTS := $(wildcard README.md tests/unit tests/integration tests/notebooks tests/browser tests/benchmarks sec_lab notebooks)
 
@@ -34,7 +36,7 @@ lab: setup  ## open the notebooks in JupyterLab
 	@$(BIN)/jupyter lab $(LAB) $(if $(filter 0,$(shell id -u)),--allow-root)
 
 test: setup lint types layers  ## run everything that CI runs
-	@$(PYTEST) --doctest-modules --doctest-glob=README.md --benchmark-disable $(NBVAL) $(TESTS)
+	@$(PYTEST) $(SPREAD) --doctest-modules --doctest-glob=README.md --benchmark-disable $(NBVAL) $(TESTS)
 
 check: setup lint types layers  ## run the quick part of it, for every commit
 	@$(PYTEST) -q -m "not slow" $(wildcard tests/unit)

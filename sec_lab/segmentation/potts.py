@@ -375,12 +375,12 @@ def joined(
     (height, width) int32
         Connected segments with labels from 1 on, the largest first, of equal ones the one that is met first.
     """
-    from sec_lab.segmentation import _domain_kernels
+    from sec_lab.segmentation import _domain_kernels, _joining_kernels
 
     # Pixels of mixed colour between two domains may have the spin of one of them with hardly a bond to it.
     domains, sizes, _ = _domain_kernels.bond_domains_of(spins, couplings, _FIRM)
     borders = _domain_kernels.borders_of(domains, couplings, len(sizes))
-    roots = _domain_kernels.merge_domains(*borders, sizes, parameters.minimum_size_px, parameters.minimum_thickness_px)
+    roots = _joining_kernels.merge_domains(*borders, sizes, parameters.minimum_size_px, parameters.minimum_thickness_px)
     totals = np.bincount(roots, weights=sizes, minlength=len(sizes))
     heads = np.flatnonzero(totals)
     label_of = np.zeros(len(sizes), np.int32)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sec_lab.segmentation import PottsParameters, superparamagnetic_clustering
-from sec_lab.segmentation._domain_kernels import bond_domains_of, borders_of, domains_of, merge_domains
+from sec_lab.segmentation._domain_kernels import bond_domains_of, borders_of, domains_of
+from sec_lab.segmentation._joining_kernels import merge_domains
 from sec_lab.segmentation.potts import (
     colour_channels,
     lattice_energy,
