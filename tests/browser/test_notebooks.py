@@ -1,16 +1,15 @@
 """Every notebook with widgets is opened whole in the browser; the cells that widgets need are executed."""
 
-import contextlib
 import os
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import nbformat
 import pytest
-from playwright.sync_api import Locator, Page
-from playwright.sync_api import TimeoutError as PlaywrightTimeout
 
-from tests.browser.conftest import ROOT, Lab
+from tests.browser.conftest import ROOT, SCREENS, Lab
+from tests.browser.controls import UPLOADED, WORD, Moved, left_out, move_every_control
 from tests.browser.slices import needed_cells, needed_places, widget_cells
 
 NOTEBOOKS = {path: nbformat.read(path, as_version=4) for path in sorted((ROOT / "notebooks").glob("*.ipynb"))}
@@ -19,10 +18,25 @@ WITH_WIDGETS = [
     for path, notebook in NOTEBOOKS.items()
     if widget_cells(notebook) and (not path.name.startswith("real_recordings_") or os.environ.get("SEC_LAB_DATA"))
 ]
-SHOWN = """(cell) => [
-  ...[...cell.querySelectorAll("canvas.sec-lab-picture")].map((one) => one.toDataURL()),
-  ...[...cell.querySelectorAll(".sec-lab-drawing")].map((one) => one.innerHTML),
-].join()"""
+EXEMPT = {"live 3D view": "says whether the next push is shown live; test_push_explorer.py looks at that"}
+"""Controls that nothing on the page need follow, and why."""
+ASKED = {
+    "None": "expected at least two that are ticked, got 0",
+    "name": "name: choose one segment",
+    "a file, or a folder of pictures": f"{WORD}: expected a movie",
+    "of a tracker, if you have any": WORD,
+    "or upload a movie (up to 500 MB):": f"{UPLOADED}.mp4: expected a movie",
+    "open": "Stopped; nothing was changed.",
+    "compare": "Stopped; nothing was changed.",
+    "merge": "Stopped; nothing was changed.",
+}
+"""Controls of which a move asks for a sentence that something is wrong, and what it says."""
+CANCELLED = {
+    "chapter2_2_real_actions": {"Cancel (Follow through the movie)"},
+    "chapter2_4_execution": {"Cancel (push)"},
+    "your_own_movie": {"cancel (open)", "cancel (compare)"},
+}
+"""Long work, which must have been stopped by its button."""
 
 
 def test_only_what_a_cell_needs_is_executed() -> None:
@@ -38,6 +52,7 @@ def test_a_notebook_is_opened_whole_and_its_widgets_move(lab: Lab, path: Path, s
     """The notebook as it is stored; the cells that its widgets need are executed, all others keep their outputs."""
     notebook = NOTEBOOKS[path]
     places = widget_cells(notebook)
+    cancels, tracked = set(), _tracked()
     page = lab.open_stored(path, needed_places(notebook, places))
     assert page.locator(".jp-Notebook .jp-Cell").count() == len(notebook.cells)
     assert page.get_by_text("Error displaying widget").count() == 0
@@ -47,22 +62,29 @@ def test_a_notebook_is_opened_whole_and_its_widgets_move(lab: Lab, path: Path, s
         cell.locator(".jp-OutputArea-output").last.wait_for(timeout=60_000)
         if "widget-view" in str(notebook.cells[place].outputs):
             cell.locator(".jupyter-widgets").first.wait_for(timeout=60_000)
-            _move(page, cell)
+            moved = move_every_control(page, cell)
             screenshot(cell, f"notebook_{path.stem}_{notebook.cells[place].id}")
+            _tell(path.stem, notebook.cells[place].id, moved)
+            assert {one.name for one in moved if not one.n_followed} <= EXEMPT.keys()
+            assert left_out(page, cell, moved) == []
+            assert [
+                (one.name, said) for one in moved for said in one.said if ASKED.get(one.name, "none") not in said
+            ] == []
+            cancels |= {one.name for one in moved}
+    assert page.get_by_text("Error displaying widget").count() == 0
+    assert CANCELLED.get(path.stem, set()) <= cancels
+    assert _tracked() == tracked
 
 
-def _move(page: Page, cell: Locator) -> None:
-    """Move the first slider that is shown; another picture or drawing must follow."""
-    drawn = "(cell) => [...cell.querySelectorAll('[data-drawn]')].some((e) => e.offsetParent)"
-    page.wait_for_function(drawn, arg=cell.element_handle(), timeout=60_000)
-    before = cell.evaluate(SHOWN)
-    handle = cell.locator(".widget-slider .noUi-handle:visible").first
-    # One that stands at an end already moves by the other key; JupyterLab may still take the focus once.
-    for key in ("End", "Home", "End", "Home"):
-        handle.press(key)
-        with contextlib.suppress(PlaywrightTimeout):
-            page.wait_for_function(
-                f"([c, was]) => ({SHOWN})(c) !== was", arg=[cell.element_handle(), before], timeout=8_000
-            )
-            return
-    pytest.fail("no picture follows the slider")
+def _tell(notebook: str, cell: str, moved: list[Moved]) -> None:
+    """Write what was moved into build/screens, beside the pictures."""
+    lines = [f"{'kind':9} {'control':40} moves  followed  slowest ms"]
+    for one in moved:
+        counted = f"{one.n_tried:5} {one.n_followed:9} {one.slowest_ms:11.0f}"
+        lines.append(f"{one.kind:9} {one.name[:40]:40} {counted}  {'; '.join(one.said)}")
+    (SCREENS / f"controls_{notebook}_{cell}.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _tracked() -> str:
+    """What git says of files that are not as they were committed, or that it does not know."""
+    return subprocess.run(["git", "-C", ROOT, "status", "--porcelain"], capture_output=True, text=True).stdout

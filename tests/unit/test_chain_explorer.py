@@ -211,6 +211,15 @@ def test_steps(book: ChainBook) -> None:
     assert book.row == rows[0]
 
 
+def test_merging_changes_nothing_until_it_is_taken(book: ChainBook) -> None:
+    before = book.observation, book.groups, book.can_undo
+    take = book.merging([3, 2])
+    assert (book.observation, book.groups, book.can_undo) == before
+    take()
+    assert book.groups == ((3, 2),)
+    assert book.can_undo
+
+
 def test_names_merging_and_taking_back(book: ChainBook) -> None:
     before = book.observation
     book.rename(2, " cup ")

@@ -1,6 +1,6 @@
 """The state of a chain explorer, without any widget: where one is, what is chosen, named and merged."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -207,6 +207,18 @@ class ChainBook:
         ValueError
             If there are fewer than two, one was not seen, or the chain would have fewer than two segments.
         """
+        self.merging(labels, tell=tell)()
+
+    def merging(self, labels: Sequence[int], *, tell: Tell | None = None) -> Callable[[], None]:
+        """Find what :meth:`merge` would make, and change nothing before the function that is given is called.
+
+        So work that is stopped at the last moment has changed nothing.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`merge` does.
+        """
         if len(labels) < 2:
             raise ValueError("merge: choose at least two segments that are parts of one object")
         unknown = [label for label in labels if label not in self.observation.segments]
@@ -218,11 +230,15 @@ class ChainBook:
         parts = [member for label in labels for member in members.pop(label, (label,))]
         groups = as_groups([*members.values(), parts])
         names = merged_names(self.observation.names, [labels])
-        found = merged(self.seen, groups, tell=tell)
-        self._remember()
-        self.groups = groups
-        self._set(_named(found, names))
-        self.choose([labels[0]])
+        found = _named(merged(self.seen, groups, tell=tell), names)
+
+        def take() -> None:
+            self._remember()
+            self.groups = groups
+            self._set(found)
+            self.choose([labels[0]])
+
+        return take
 
     def undo(self) -> None:
         """Take back the last name or the last merging; nothing if there was none."""

@@ -281,7 +281,7 @@ class ChainExplorer(ipywidgets.VBox):  # type: ignore[misc]
             book.merge(book.chosen)
             return
         chosen = list(book.chosen)
-        self._work.start(lambda tell: book.merge(chosen, tell=tell), on_done=lambda _: self._do(lambda _: None))
+        self._work.start(lambda tell: book.merging(chosen, tell=tell), on_done=lambda take: self._do(lambda _: take()))
 
     def _let_go(self, book: ChainBook) -> None:
         book.row = None
