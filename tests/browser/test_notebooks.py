@@ -53,7 +53,8 @@ def test_a_notebook_is_opened_whole_and_its_widgets_move(lab: Lab, path: Path, s
     notebook = NOTEBOOKS[path]
     places = widget_cells(notebook)
     cancels, tracked = set(), _tracked()
-    page = lab.open_stored(path, needed_places(notebook, places))
+    # So high that each widget is on its picture as a whole.
+    page = lab.open_stored(path, needed_places(notebook, places), height=2100)
     assert page.locator(".jp-Notebook .jp-Cell").count() == len(notebook.cells)
     assert page.get_by_text("Error displaying widget").count() == 0
     for place in places:

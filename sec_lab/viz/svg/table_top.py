@@ -133,7 +133,8 @@ def _draw_scale(paper: Paper) -> None:
     for y_m in np.arange(-0.2, _Y_M[1], _STEP_M):
         (x, top), (_, bottom) = _px(_X_M[1], y_m), _px(_X_M[0], y_m)
         paper.line(x, top, x, bottom, opacity="0.12")
-        paper.words(x, bottom + 9, f"{y_m:.1f}".replace("-0.0", "0.0"), size_px=SMALL_PX, soft=True, anchor="middle")
+        read = f"{y_m:.1f}".replace("-0.0", "0.0").replace("-", "−")
+        paper.words(x, bottom + 9, read, size_px=SMALL_PX, soft=True, anchor="middle")
     x, y = _px(_X_M[0], 0.0)
     paper.words(x, y + 22, "y in m", size_px=SMALL_PX, soft=True, anchor="middle")
     x, y = _px(0.25, _Y_M[1])

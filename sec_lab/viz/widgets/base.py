@@ -26,8 +26,8 @@ WIDE = {"width": "420px"}
 TOGGLES = {**LABELS, "button_width": "auto"}
 """Style of toggle buttons."""
 
-INSET = {"padding": "0 0 0 3px"}
-"""Layout of toggle buttons, whose label would else begin outside of its row, which cuts it off."""
+INSET = {"padding": "0 0 3px 3px"}
+"""Layout of toggle buttons, whose label and shadow would else reach out of their row, which cuts them off."""
 
 
 class Explorer(widgets.VBox):  # type: ignore[misc]  # ipywidgets is untyped

@@ -74,9 +74,11 @@ class PushExplorer(Explorer):
         self._make_controls(live=live)
         self._worker = self.latest(self._show_made)
         self.show(
-            row_of(self.which, self.seed, self.third, self.azimuth, self.elevation),
+            row_of(self.which, self.seed, self.third),
+            row_of(self.azimuth, self.elevation),
             row_of(self.thing, self.shape),
-            row_of(self.x, self.y, self.turn, self.size),
+            row_of(self.x, self.y),
+            row_of(self.turn, self.size),
             row_of(self.table, self.camera),
             row_of(self.push, self.live, self.work_bar),
             self.said, self.verdicts, self.view_3d, self.strip, self.chains,
