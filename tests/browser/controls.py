@@ -12,6 +12,8 @@ MOST_OPTIONS = 6
 WORD, UPLOADED = "typed_by_hand", "uploaded_by_hand"
 PLACES = ((0.5, 0.5), (0.3, 0.6), (0.75, 0.3), (0.2, 0.25))
 KEYS = ("ArrowRight", "ArrowDown", "ArrowLeft")
+STATELESS = ("picture", "keys", "button", "play", "upload")
+"""Kinds of which the page does not show where they stand."""
 READ_BY = {"a file, or a folder of pictures": "open", "of a tracker, if you have any": "open", "save as": "save"}
 """Texts that are read when a button is pressed; the page then shows what was typed."""
 STOPPED_ONLY = frozenset({"push"})
@@ -55,8 +57,10 @@ class Walk:
         return self.page.evaluate(f"(given) => secLabControls.{what}(...given)", [self._node, *given])
 
     def controls(self) -> list[dict[str, Any]]:
+        """Also the keys of pictures, where the hint promises that they do something."""
         found: list[dict[str, Any]] = self.ask("controls")
-        return found
+        keyed = [one for one in found if one["kind"] == "picture" and ("keys" in one["hint"] or "←" in one["hint"])]
+        return [*found, *({**one, "kind": "keys", "name": f"{one['name']}, by keys"} for one in keyed)]
 
     def at(self, control: dict[str, Any]) -> Locator:
         return self.cell.locator(f"[data-control='{control['id']}']")
@@ -127,11 +131,11 @@ def move_every_control(page: Page, cell: Locator) -> list[Moved]:
     again: list[dict[str, Any]] = []
     while (control := _next(walk, moved)) is not None:
         _move(walk, control, moved)
-        if not moved[control["id"]].n_followed:
+        if not moved[_key(control)].n_followed:
             again.append(control)
     # The last ones first: they may undo what others have done.
     for control in reversed(again):
-        if control in walk.controls():
+        if _key(control) in map(_key, walk.controls()):
             _move(walk, control, moved)
     return [*moved.values(), *walk.cancels.values()]
 
@@ -142,8 +146,13 @@ def left_out(page: Page, cell: Locator, moved: list[Moved]) -> list[str]:
     return [control["name"] for control in Walk(page, cell).controls() if control["name"] not in names]
 
 
+def _key(control: dict[str, Any]) -> str:
+    return f"{control['id']} {control['kind']}"
+
+
 def _next(walk: Walk, moved: dict[str, Moved]) -> dict[str, Any] | None:
-    found = [one for one in walk.controls() if one["id"] not in moved and (one["isEnabled"] or one["name"] in PREPARED)]
+    found = [one for one in walk.controls() if _key(one) not in moved]
+    found = [one for one in found if one["isEnabled"] or one["name"] in PREPARED]
     return min(found, key=lambda one: one["kind"] == "button", default=None)
 
 
@@ -160,11 +169,11 @@ def _move(walk: Walk, control: dict[str, Any], moved: dict[str, Moved]) -> None:
         word = next(moves, None)
         if word is None:
             break
-        outcome = walk.ask("after", node, control["kind"] not in ("picture", "button", "play", "upload"))
+        outcome = walk.ask("after", node, control["kind"] not in STATELESS)
         outcome["isFollowed"] &= word in outcome["words"]
         outcomes.append(outcome)
     walk.ask("rest")
-    moved[control["id"]] = Moved(
+    moved[_key(control)] = Moved(
         control["kind"],
         control["name"],
         n_tried=sum(outcome["isMoved"] for outcome in outcomes),
@@ -174,17 +183,18 @@ def _move(walk: Walk, control: dict[str, Any], moved: dict[str, Moved]) -> None:
     )
 
 
-def _point(_: Walk, one: Locator, control: dict[str, Any]) -> Iterator[str]:
-    """Click here and there; press keys where the hint promises that they do something."""
+def _point(_: Walk, one: Locator, __: dict[str, Any]) -> Iterator[str]:
     for across, down in PLACES:
         box = one.bounding_box()
         assert box is not None
         one.click(position={"x": across * box["width"], "y": down * box["height"]})
         yield ""
-    if "keys" in control["hint"] or "←" in control["hint"]:
-        for key in KEYS:
-            one.press(key)
-            yield ""
+
+
+def _press_keys(_: Walk, one: Locator, __: dict[str, Any]) -> Iterator[str]:
+    for key in KEYS:
+        one.press(key)
+        yield ""
 
 
 def _slide(_: Walk, one: Locator, __: dict[str, Any]) -> Iterator[str]:
@@ -290,6 +300,7 @@ def _press(walk: Walk, one: Locator, control: dict[str, Any]) -> Iterator[str]:
 
 MOVES: dict[str, Callable[[Walk, Locator, dict[str, Any]], Iterator[str]]] = {
     "picture": _point,
+    "keys": _press_keys,
     "slider": _slide,
     "toggles": _toggle,
     "dropdown": _drop,
