@@ -20,6 +20,7 @@ class _Segment:
     largest: int = 0
     node: bool = False
     leaves: bool = False
+    crumb: bool = False
     rests: int = 0
     has_moved: bool = False
 
@@ -56,20 +57,24 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
         area = {label: len(pixels) for label, pixels in places.items()}
         centre = {label: _centre(pixels) for label, pixels in places.items()}
         rests = {label: label not in moving[now] for label in places}
-        away, covered, hidden, pauses = {}, {}, {}, {}
         for label in sorted(places):
             segment = segments.setdefault(label, _Segment(now, centre[label]))
             segment.largest = max(segment.largest, area[label])
+            tiny = area[label] <= p.crumb_share * segment.largest
+            segment.crumb = segment.leaves and not _at_border(places[label], image) and tiny
+            rests[label] |= segment.crumb
+        away, covered, hidden, pauses = {}, {}, {}, {}
+        for label in sorted(places):
+            segment = segments[label]
             distance = sum((a - b) ** 2 for a, b in zip(centre[label], segment.rest_place, strict=True))
             away[label] = distance * 3.141592653589793 > segment.largest
             covered[label] = any(hints.touching[label, other] for other in places if not rests[other])
             hidden[label] = area[label] < p.visible_share * segment.largest
             if rests[label] and not covered[label]:
                 segment.rest_place = centre[label]
-            at_border = any(
-                column in (0, len(image[0]) - 1) or row in (0, len(image) - 1) for column, row in places[label]
-            )
-            segment.leaves = at_border and not rests[label] and area[label] <= p.leaving_share * segment.largest
+            at_border = _at_border(places[label], image)
+            small = area[label] <= p.leaving_share * segment.largest
+            segment.leaves = segment.crumb or (at_border and not rests[label] and small)
             segment.rests = segment.rests + 1 if rests[label] else 0
             segment.has_moved = segment.has_moved or not rests[label]
             short = rests[label] and segment.rests < p.pause_frames
@@ -97,7 +102,7 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
                 counted[pair] = touching[pair]
 
         for label, segment in list(segments.items()):
-            if label in places:
+            if label in places and not segment.crumb:
                 segment.last = now
                 segment.seen += 1
                 if not segment.node and segment.seen >= p.min_life_frames:
@@ -143,7 +148,6 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
                 _settle(known, known.state)
                 continue
             if (code > 0) != (known.state > 0):
-                known.kind = 0
                 if not known.contact or now - known.contact_start >= memory:
                     known.contact_start, known.contact = now, []
                 known.contact.append(code)
@@ -154,7 +158,9 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
                         relations[frame][pair] = known.state or 0
                 continue
             known.contact = []
-            if code == known.state or not calm:
+            if not calm:
+                continue
+            if code == known.state:
                 known.kind = 0
                 continue
             if not known.kind or now - known.kind_start >= memory:
@@ -177,6 +183,10 @@ def naive_steady(movie: list[Image], moving: list[set[int]], p: TimeParameters) 
         (sorted(nodes), {pair: relations[frame].get(pair, 0) for pair in combinations(sorted(nodes), 2)})
         for frame, nodes in enumerate(present)
     ]
+
+
+def _at_border(pixels: list[tuple[int, int]], image: Image) -> bool:
+    return any(column in (0, len(image[0]) - 1) or row in (0, len(image) - 1) for column, row in pixels)
 
 
 def _centre(pixels: list[tuple[int, int]]) -> tuple[float, float]:

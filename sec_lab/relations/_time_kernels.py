@@ -223,14 +223,15 @@ def advance_pairs(
                 pair[CONTACT_COUNT] += 1
                 pair[ONES] += code == 1
                 pair[TWOS] += code == 2
-                pair[KIND_COUNT] = 0
                 if pair[CONTACT_COUNT] >= lasting:
                     pair[STATE] = 0 if code == 0 else (1 if pair[ONES] > pair[TWOS] else 2)
                     _write_back(ring, i, j, pair[CONTACT_START], now, pair[STATE])
                     clear(pair)
                 continue
             pair[CONTACT_COUNT] = 0
-            if code == state or not calm:
+            if not calm:  # says nothing of the kind, neither for nor against
+                continue
+            if code == state:
                 pair[KIND_COUNT] = 0
                 continue
             if pair[KIND_COUNT] == 0 or now - pair[KIND_START] >= length:

@@ -224,6 +224,9 @@ class _State:
             rests = self._measured(codes, width, seen, slots, away, p.rest_px)
         else:
             rests = np.zeros(len(slots), np.bool_)
+        crumbs = seen.pixels <= p.crumb_share * self.largest[slots]
+        crumbs &= (self.table[slots, kernels.LEAVES] > 0) & ~seen.at_border
+        rests |= crumbs
         pauses = np.zeros(len(slots), np.bool_)
         if known:
             self.still[slots] = np.where(rests, self.still[slots] + 1, 0)
@@ -249,9 +252,9 @@ class _State:
                     touching[i, j] = touching[j, i] = seen.touching_2d[i, j]
 
         here = np.zeros(len(self.active), np.bool_)
-        here[slots] = True
         small = seen.pixels <= p.leaving_share * self.largest[slots]
-        self.table[slots, kernels.LEAVES] = seen.at_border & ~rests & small
+        self.table[slots, kernels.LEAVES] = (seen.at_border & ~rests & small) | crumbs
+        here[slots] = ~crumbs
         self.table[slots, kernels.RESTS] = np.where(rests, self.table[slots, kernels.RESTS] + 1, 0)
         self.place[slots] = seen.centres
         lasting = max(1, p.hysteresis_frames)

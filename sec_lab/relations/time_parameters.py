@@ -42,6 +42,9 @@ class TimeParameters:
         A segment that touched the border of the picture, moved and showed no more than this share of its greatest size
         when it was last seen, has left through the border and is absent without being held. Going out takes several
         frames, in which it shrinks; what is lost at full size was lost by the tracker. 1: the size does not matter.
+    crumb_share : float
+        A segment that was leaving is not back if no more than this share of its greatest size is seen away from the
+        border: what a tracker takes for it there is the rim of something that it uncovered. 0: off.
     visible_share : float
         A segment that shows less than this share of its greatest size says nothing of its contacts: what is seen of
         its border is not where it touches. Its relations stay. 0: off.
@@ -95,6 +98,7 @@ class TimeParameters:
     skip_px: int = SKIP_PX
     hold_frames: int = 60
     leaving_share: float = 0.5
+    crumb_share: float = 0.02
     visible_share: float = 0.3
     min_life_frames: int = 12
     motion_frames: int = 8
@@ -115,7 +119,7 @@ class TimeParameters:
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name}: expected a finite number from 0 on or None, got {value!r}")
-        for name in ("leaving_share", "visible_share"):
+        for name in ("leaving_share", "crumb_share", "visible_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name}: expected a share from 0 to 1, got {getattr(self, name)!r}")
         for name in ("touching_thresholds", "overlapping_thresholds"):
@@ -133,6 +137,7 @@ PICTURE_ALONE = TimeParameters(
     hold_frames=0,
     visible_share=0.0,
     leaving_share=1.0,
+    crumb_share=0.0,
     min_life_frames=1,
     rest_px=None,
     pause_frames=0,

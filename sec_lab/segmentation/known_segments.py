@@ -16,6 +16,9 @@ N_SLOTS = 256
 CLEARLY = 2.0
 """By so much another segment must fit worse for one to be known by colours that hardly fit, in nats per pixel."""
 
+SURELY = 1.0
+"""By so much where its place speaks for it, too, or where it fits well by itself."""
+
 LEAST_TAUGHT_PX = 30
 """A segment must show more pixels for its colours to be learned: the rims of a smaller one are mixed with others."""
 
@@ -228,7 +231,8 @@ class KnownSegments:
         cost = {k: float(self.tables[k].reshape(N_LIGHTNESS, -1).min(axis=0)[hue].mean()) for k in known}
         others = [k for k in known if k != slot]
         best = min(others, key=cost.__getitem__, default=slot)
-        if best == slot or cost[best] >= cost.get(slot, np.inf) - CLEARLY:
+        margin = SURELY if best in beside else CLEARLY
+        if best == slot or cost[best] >= cost.get(slot, np.inf) - margin:
             return []
         if best in beside and cost[best] < self._p.fitting_cost:
             return [best]

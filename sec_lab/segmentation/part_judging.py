@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sec_lab.segmentation.known_segments import CLEARLY, N_SLOTS, KnownSegments, Slots
+from sec_lab.segmentation.known_segments import CLEARLY, N_SLOTS, SURELY, KnownSegments, Slots
 from sec_lab.segmentation.layer_parameters import LayerParameters
 
 UNTAUGHT = 256
@@ -26,8 +26,6 @@ _ELSEWHERE, _COME_TO_LIGHT = 4.0, 2.0
 """Of a part away from its segment, by colour alone; and if the segment was hidden."""
 _LACKING = 2.5
 """By so much colours may fit worse if most of a segment is missing right here: it is in another light."""
-_SURELY = 1.0
-"""By so much colours must fit better where nothing but colour speaks for a segment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +101,11 @@ class Part:
     colour: NDArray[np.float32]
     fits: NDArray[np.float32]
     colours: Callable[[], NDArray[np.uint16]]
+
+    @property
+    def beside(self) -> NDArray[np.float32]:
+        """Share of its rim, without that to the background, that borders on each slot."""
+        return self.around / np.float32(max(1e-3, 1 - self.around[1]))
 
 
 def parts_of(slots: Slots, unknown_for: Slots, resting_for: Slots) -> Parts:
@@ -184,13 +187,13 @@ class Judge:
             if slot <= 1 or not segments.known[slot]:
                 continue
             # A segment of which much is missing takes what is next to it, even in another light.
-            lacking = bool(segments.missing[slot]) and part.around[slot] > _LARGELY_BESIDE
+            lacking = bool(segments.missing[slot]) and part.beside[slot] > _LARGELY_BESIDE
             fitting = part.colour[slot] < p.fitting_cost + (_LACKING if lacking else 0)
             near = part.around[slot] > _BESIDE or part.guess[slot] > _EXPECTED
             grows = segments.mover[slot] and (fitting or enters or segments.young(slot))
             if near and (grows or ((segments.moving[slot] or segments.missing[slot]) and fitting)):
                 score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
-            elif part.colour[slot] < p.fitting_cost - _SURELY:
+            elif part.colour[slot] < p.fitting_cost - SURELY:
                 score = part.colour[slot] + (_COME_TO_LIGHT if segments.hidden[slot] else _ELSEWHERE)
             elif self._comes_to_light(part, int(slot)):
                 score, fitting = part.colour[slot] + _COME_TO_LIGHT, True
@@ -228,7 +231,7 @@ class Judge:
         segments = self.segments
         bound = self.parameters.unknown_cost
         others = np.ones_like(segments.known)
-        if segments.missing[slot] and part.around[slot] > _LARGELY_BESIDE:
+        if segments.missing[slot] and part.beside[slot] > _LARGELY_BESIDE:
             bound += CLEARLY
             others = part.around > _HARDLY_BESIDE
         elif not segments.hidden[slot]:
@@ -251,11 +254,31 @@ class Judge:
             below = int(np.argmax(np.where(lifted, part.below, 0)))
             for slot in self.segments.of_one_hue(part.colours(), below, np.flatnonzero(part.around > _HARDLY_BESIDE)):
                 return slot
+        known = self._lacking(part) or self._in_other_light(part)
+        if known:
+            return UNTAUGHT + known
         hand = float(part.around[self.segments.mover].sum())
         large = part.area >= self.new_px and part.thick
         if large and (hand < 0.3 or part.area >= 4 * self.new_px):
             return self._new(part, mover=False)
         return UNTAUGHT + self.absorbing(part)
+
+    def _lacking(self, part: Part) -> int:
+        """A segment on the way of which as much is missing as the part has, all around it; 0 if there is none."""
+        segments = self.segments
+        now = np.bincount(self.slots.ravel(), minlength=N_SLOTS)
+        lacks = segments.missing & segments.moving & (segments.most_px - now > part.area / 2)
+        lacks &= (part.around > 0.5) & (part.colour < self.parameters.unknown_cost + CLEARLY)
+        return int(np.argmax(np.where(lacks, part.around, 0)))
+
+    def _in_other_light(self, part: Part) -> int:
+        """The segment that rests below a part, if it explains it and nothing else nearly does; 0 otherwise."""
+        below = int(np.argmax(part.below))
+        if below <= 1 or part.below[below] <= 0.5 or self.segments.moving[below]:
+            return 0
+        others = np.delete(part.colour, below)
+        explained = part.colour[below] < min(self.parameters.unknown_cost, float(others.min()) - CLEARLY)
+        return below if explained else 0
 
     def absorbing(self, part: Part) -> int:
         """Slot that a part falls to which is too small, or not to be explained yet."""

@@ -142,6 +142,31 @@ def test_a_segment_that_shrinks_out_of_the_picture_is_gone_and_one_lost_on_the_w
     assert story(steady(kept), HAND, TABLE) == [(0, A), (20, N)]
 
 
+def test_a_crumb_of_a_hand_that_has_left_is_not_the_hand() -> None:
+    """A tracker takes 3 × 3 pixels inside the picture for the hand of 1,800, for 18 frames after it has left."""
+    way = [picture(cup=CUP_AT, hand=hand_from_the_right(tip)) for tip in range(118, 58, -3)]
+    movie = [*[picture(cup=CUP_AT)] * 20, *way, *way[::-1]]
+    left = len(movie)
+    movie += [picture(cup=CUP_AT, hand=(30, 33, 20, 23))] * 18 + [picture(cup=CUP_AT)] * 20
+    told = [relation for _, relation in story(steady(movie), HAND, TABLE)]
+    assert told == [A, N, A]
+    (*_, (gone, _)) = story(steady(movie), HAND, TABLE)
+    assert left - 1 <= gone <= left
+    assert story(steady(movie, crumb_share=0.0), HAND, TABLE)[-1][1] == N
+    # Half as large as the hand it is no crumb, wherever it is.
+    back = [*movie[:left], *[picture(cup=CUP_AT, hand=(25, 55, 70, 100))] * 38]
+    assert story(steady(back), HAND, TABLE)[-1][1] != A
+
+
+def test_a_glitch_of_motion_delays_what_kind_a_contact_is_and_does_not_begin_anew() -> None:
+    """Put down and at rest in the cup's place, seen to move in every fifth frame: surrounded all the same."""
+    moving = [{HAND}] * 10 + [{HAND} if n % 5 == 4 else set() for n in range(30)]
+    movie = [picture(cup=(20, 60, 30, 80), hand=(30, 50, 40, 60))] * 40
+    frames = [SeenFrame(number, *seen) for number, seen in enumerate(zip(movie, [None] * 40, moving, strict=True))]
+    p = TimeParameters(contact_by_motion=False)
+    assert story(list(steady_relations(frames, parameters=p)), CUP, HAND) == [(0, T), (10, O)]
+
+
 def test_splinters_never_become_segments() -> None:
     movie = [picture(cup=CUP_AT)] * 50
     movie[20:31] = [picture(cup=CUP_AT, speck=(5, 10, 5, 10))] * 11
@@ -337,6 +362,7 @@ def movies(draw: st.DrawFn) -> tuple[Movie, list[set[int]]]:
     pause=st.integers(0, 9),
     switches=st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans()),
     visible=st.sampled_from([0.0, 0.3, 0.7]),
+    crumb=st.sampled_from([0.0, 0.2, 0.5]),
 )
 def test_steady_relations_as_the_slow_reference_finds_them(
     given_movie: tuple[Movie, list[set[int]]],
@@ -346,6 +372,7 @@ def test_steady_relations_as_the_slow_reference_finds_them(
     pause: int,
     switches: tuple[bool, bool, bool, bool],
     visible: float,
+    crumb: float,
 ) -> None:
     movie, moving = given_movie
     names = ("freeze", "contact_by_motion", "carried", "kind_at_rest")
@@ -357,6 +384,7 @@ def test_steady_relations_as_the_slow_reference_finds_them(
             pause_frames=pause,
             together_frames=0,
             visible_share=visible,
+            crumb_share=crumb,
         ),
         **dict(zip(names, switches, strict=True)),
     )

@@ -28,7 +28,7 @@ RULES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "two thresholds": ("touching_thresholds", "overlapping_thresholds"),
         "changes must last": ("hysteresis_frames",),
         "segments must live": ("min_life_frames",),
-        "hidden segments are held": ("hold_frames", "leaving_share"),
+        "hidden segments are held": ("hold_frames", "leaving_share", "crumb_share"),
         "depth parts": ("step_m",),
         "hardly visible says nothing": ("visible_share",),
         "contact by motion": ("rest_px", "contact_by_motion"),
