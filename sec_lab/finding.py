@@ -178,6 +178,31 @@ def find_actions(
     return _find(patterns, chain, least_percent, unfinished=unfinished)
 
 
+def has_contact(model: ActionModel) -> bool:
+    """Whether a contact comes about in a model, so that it can be looked for.
+
+    Parameters
+    ----------
+    model : ActionModel
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> chains = [EventChain([row], [(1, 2)]) for row in ([0, 2], [2, 0])]
+    >>> comes, goes = (ActionModel(chain, [1], [1, 1], ["one"], {}, [[0, 1]]) for chain in chains)
+    >>> has_contact(comes), has_contact(goes)
+    (True, False)
+    """
+    return bool(_comes_about(_CODE[model.chain.relations] == kernels.CONTACT).any())
+
+
+def _comes_about(contact: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return np.asarray(contact[:, 1:] & ~contact[:, :-1])
+
+
 class OnlineFinder:
     """Finding actions while a movie goes on, frame by frame.
 
@@ -245,7 +270,7 @@ class _Pattern:
         codes = _CODE[model.chain.relations]
         contact = codes == kernels.CONTACT
         rows = np.flatnonzero((contact != contact[:, :1]).any(axis=1))
-        comes = contact[rows, 1:] & ~contact[rows, :-1]
+        comes = _comes_about(contact[rows])
         if not comes.any():
             raise ValueError(f"model {name}: expected a row in which a contact comes about, got none")
         self.name = name

@@ -19,10 +19,6 @@ SAMPLE = (
 """Others than those that the notebooks observe."""
 
 
-KEPT_VERSIONS = {"put_and_take": {"kitchen": 8}}
-"""How many versions of each action are kept, where it is not all of them."""
-
-
 @pytest.mark.parametrize("collection", COLLECTIONS)
 def test_every_movie_has_its_chains(collection: str) -> None:
     folder = DATASETS / collection
@@ -30,7 +26,7 @@ def test_every_movie_has_its_chains(collection: str) -> None:
         setting: [
             f"{action}_{version}"
             for action, versions in COLLECTIONS[collection].items()
-            for version in versions[: KEPT_VERSIONS.get(collection, {}).get(setting)]
+            for version in versions
         ]
         for setting in SETTINGS
     }

@@ -12,14 +12,12 @@ from sec_lab.worlds.tabletop.settings import SETTINGS
 from sec_lab.worlds.tabletop.truth import read_truth
 
 DATASETS = Path("datasets")
-KEPT_VERSIONS = {"put_and_take": {"kitchen": 8}}
-"""How many versions of each action are kept, where it is not all of them."""
 MOVIES = [
     (collection, f"{action}_{version}_{setting}")
     for collection, actions in COLLECTIONS.items()
     for action, versions in actions.items()
     for setting in SETTINGS
-    for version in versions[: KEPT_VERSIONS.get(collection, {}).get(setting)]
+    for version in versions
 ]
 N_FILES = {"tabletop_actions": 5, "put_and_take": 6}
 """In the folder of a movie: both eyes, calibration, truth and names; and when something is put or taken."""
