@@ -219,7 +219,6 @@ def naive_settled(
     *,
     is_mover: bool,
     any_mover: bool,
-    is_strange: bool,
     settle_frames: int,
     moved_by: int,
 ) -> Settled:
@@ -236,7 +235,7 @@ def naive_settled(
     )
     if is_mover or slot == 0 or now.resting_for < settle_frames:
         return now
-    if slot != now.rest or (is_strange and slot != 1 and not any_mover):
+    if slot != now.rest:
         now.rest, now.seen = slot, colour.astype(np.float32)
         now.brightest = np.float32(1.45 if any_mover else 1.05)
     else:

@@ -184,8 +184,6 @@ def settle(
     slots_before: Slots,
     mover: NDArray[np.bool_],
     any_mover: np.bool_,
-    static_cost: Floats,
-    strange_cost: float,
     settle_frames: int,
     moved_by: int,
     unknown_for: NDArray[np.uint8],
@@ -206,9 +204,7 @@ def settle(
             resting_for[y, x] = min(resting_for[y, x] + 1, 250) if slot == slots_before[y, x] and not moved else 0
             if mover[slot] or slot == UNKNOWN or resting_for[y, x] < settle_frames:
                 continue
-            # What was seen of a segment here before it went away and came back may be another part of it.
-            strange = not any_mover and slot != BACKGROUND and static_cost[y, x] > strange_cost
-            if rest[y, x] != slot or strange:
+            if rest[y, x] != slot:
                 rest[y, x] = slot
                 for c in range(3):
                     seen[y, x, c] = image[y, x, c]

@@ -102,11 +102,6 @@ class Part:
     fits: NDArray[np.float32]
     colours: Callable[[], NDArray[np.uint16]]
 
-    @property
-    def beside(self) -> NDArray[np.float32]:
-        """Share of its rim, without that to the background, that borders on each slot."""
-        return self.around / np.float32(max(1e-3, 1 - self.around[1]))
-
 
 def parts_of(slots: Slots, unknown_for: Slots, resting_for: Slots) -> Parts:
     """Connected parts of equal slots, 8 neighbours; images (height, width) uint8, times in frames."""
@@ -187,7 +182,7 @@ class Judge:
             if slot <= 1 or not segments.known[slot]:
                 continue
             # A segment of which much is missing takes what is next to it, even in another light.
-            lacking = bool(segments.missing[slot]) and part.beside[slot] > _LARGELY_BESIDE
+            lacking = bool(segments.missing[slot]) and part.around[slot] > _LARGELY_BESIDE
             fitting = part.colour[slot] < p.fitting_cost + (_LACKING if lacking else 0)
             near = part.around[slot] > _BESIDE or part.guess[slot] > _EXPECTED
             grows = segments.mover[slot] and (fitting or enters or segments.young(slot))
@@ -231,7 +226,7 @@ class Judge:
         segments = self.segments
         bound = self.parameters.unknown_cost
         others = np.ones_like(segments.known)
-        if segments.missing[slot] and part.beside[slot] > _LARGELY_BESIDE:
+        if segments.missing[slot] and part.around[slot] > _LARGELY_BESIDE:
             bound += CLEARLY
             others = part.around > _HARDLY_BESIDE
         elif not segments.hidden[slot]:

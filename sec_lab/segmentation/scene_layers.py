@@ -102,8 +102,6 @@ class Layers:
             self.slots,
             segments.mover,
             movers_there,
-            costs[0],
-            p.unknown_cost,
             p.settle_frames,
             p.moved_by,
             self._unknown_for,

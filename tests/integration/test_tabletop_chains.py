@@ -23,11 +23,7 @@ SAMPLE = (
 def test_every_movie_has_its_chains(collection: str) -> None:
     folder = DATASETS / collection
     kept = {
-        setting: [
-            f"{action}_{version}"
-            for action, versions in COLLECTIONS[collection].items()
-            for version in versions
-        ]
+        setting: [f"{action}_{version}" for action, versions in COLLECTIONS[collection].items() for version in versions]
         for setting in SETTINGS
     }
     assert [movie.name for movie in movies_in(folder)] == [

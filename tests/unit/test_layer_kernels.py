@@ -282,7 +282,6 @@ def test_settle(size: tuple[int, int], seed: int, any_mover: bool) -> None:
     unknown_for, resting_for = rng.choice([0, 2, 3, 9, 249, 250], (2, *size)).astype(np.uint8)
     seen, behind = (rng.uniform(90, 160, (2, *size, 3))).astype(np.float32)
     behind_sigma, brightest = rng.choice([0.0, 4.0], size).astype(np.float32), np.full(size, 1.05, np.float32)
-    cost = rng.choice([4, 12, 12.5], size).astype(np.float32)
     state = {
         pixel: Settled(
             int(unknown_for[pixel]),
@@ -303,8 +302,6 @@ def test_settle(size: tuple[int, int], seed: int, any_mover: bool) -> None:
         slots_before,
         mover,
         np.bool_(any_mover),
-        cost,
-        12.0,
         3,
         4,
         unknown_for,
@@ -325,7 +322,6 @@ def test_settle(size: tuple[int, int], seed: int, any_mover: bool) -> None:
             int(slots_before[pixel]),
             is_mover=bool(mover[slots[pixel]]),
             any_mover=any_mover,
-            is_strange=bool(cost[pixel] > 12),
             settle_frames=3,
             moved_by=4,
         )

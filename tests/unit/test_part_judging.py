@@ -76,8 +76,3 @@ def test_a_resting_thing_in_another_light_stays_what_it_is() -> None:
     for colour in ({PLATE: 11.5, CUP: 13.0}, {PLATE: 12.5}):
         _, judge = scene()
         assert judge.left_behind(part({TABLE: 0.1, PLATE: 0.9}, {PLATE: 1.0}, colour)) > PLATE
-
-
-def test_the_background_is_left_out_of_what_a_part_is_beside() -> None:
-    assert part({TABLE: 0.6, CUP: 0.2, PLATE: 0.2}, {}, {}).beside[CUP] == pytest.approx(0.5)
-    assert part({TABLE: 1.0}, {}, {}).beside[CUP] == 0
