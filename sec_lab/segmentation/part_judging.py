@@ -249,9 +249,9 @@ class Judge:
             below = int(np.argmax(np.where(lifted, part.below, 0)))
             for slot in self.segments.of_one_hue(part.colours(), below, np.flatnonzero(part.around > _HARDLY_BESIDE)):
                 return slot
-        known = self._lacking(part) or self._in_other_light(part)
-        if known:
-            return UNTAUGHT + known
+        lacking = self._lacking(part)
+        if lacking:
+            return UNTAUGHT + lacking
         hand = float(part.around[self.segments.mover].sum())
         large = part.area >= self.new_px and part.thick
         if large and (hand < 0.3 or part.area >= 4 * self.new_px):
@@ -265,15 +265,6 @@ class Judge:
         lacks = segments.missing & segments.moving & (segments.most_px - now > part.area / 2)
         lacks &= (part.around > 0.5) & (part.colour < self.parameters.unknown_cost + CLEARLY)
         return int(np.argmax(np.where(lacks, part.around, 0)))
-
-    def _in_other_light(self, part: Part) -> int:
-        """The segment that rests below a part, if it explains it and nothing else nearly does; 0 otherwise."""
-        below = int(np.argmax(part.below))
-        if below <= 1 or part.below[below] <= 0.5 or self.segments.moving[below]:
-            return 0
-        others = np.delete(part.colour, below)
-        explained = part.colour[below] < min(self.parameters.unknown_cost, float(others.min()) - CLEARLY)
-        return below if explained else 0
 
     def absorbing(self, part: Part) -> int:
         """Slot that a part falls to which is too small, or not to be explained yet."""

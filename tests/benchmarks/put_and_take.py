@@ -9,7 +9,7 @@ import pandas as pd
 
 import sec_lab as sl
 from sec_lab.classification import unsupervised_classes
-from sec_lab.finding import find_actions
+from sec_lab.finding import find_actions, has_contact
 from sec_lab.learning import learn
 from sec_lab.worlds.tabletop.chains import SOURCES, read_chains
 from sec_lab.worlds.tabletop.deeds import TimedDeed, read_deeds
@@ -64,9 +64,11 @@ def figures(chains: Mapping[str, sl.EventChain], deeds: Mapping[str, Sequence[Ti
     )
     wins = [like.loc[name, shown[name]] > like.loc[name].drop(shown[name]).max() for name in single]
     mixed = like.drop(index=list(single))
+    findable = {kind: model for kind, model in models.items() if has_contact(model)}
     errors = []
     for name, chain in chains.items():
-        found = [(one.model, one.begin, one.end) for one in find_actions(models, chain) if one.end is not None]
+        hits = find_actions(findable, chain) if findable else []
+        found = [(one.model, one.begin, one.end) for one in hits if one.end is not None]
         errors.append(timing_errors(found, deeds[name]))
     every = pd.concat(errors)
     return Figures(

@@ -8,6 +8,7 @@ import numpy as np
 from playwright.sync_api import Locator, Page
 
 from sec_lab.graphml import read_observation
+from sec_lab.viz.widgets.nearest import nearest, repository_chains
 from tests.browser.conftest import ROOT, Lab
 
 WIDGET = """
@@ -99,11 +100,12 @@ def test_upload_stop_explore_compare_and_save(lab: Lab, screenshot: Callable[...
     button(page, "compare").click()
     page.locator(".sec-lab-own-movie table").wait_for(timeout=60_000)
     first = page.locator(".sec-lab-own-movie table tbody tr").first.inner_text()
-    assert "moving object 1" in first or "moving object 4" in first
     page.locator(".sec-lab-own-movie input[type=text]").nth(3).fill("seen_by_hand")
     button(page, "save").click()
     page.get_by_text("seen_by_hand.graphml").wait_for()
     screenshot(page.locator(".sec-lab-own-movie"), "own_movie")
     saved = read_observation(lab.folder / "seen_by_hand.graphml")
     assert saved.segments.tolist() == [1, 4, 5, 6]
+    likest = nearest(saved.chain, repository_chains()).iloc[0]
+    assert first.split("\t")[:2] == [likest.name, f"{likest.temporal:.1f}"]
     assert (lab.folder / "seen_by_hand.html").stat().st_size < 5_000_000
