@@ -259,7 +259,7 @@ class Judge:
         return UNTAUGHT + self.absorbing(part)
 
     def _lacking(self, part: Part) -> int:
-        """A segment on the way of which as much is missing as the part has, all around it; 0 if there is none."""
+        """A segment on the way that surrounds most of a part and lacks more than half as much; 0 if there is none."""
         segments = self.segments
         now = np.bincount(self.slots.ravel(), minlength=N_SLOTS)
         lacks = segments.missing & segments.moving & (segments.most_px - now > part.area / 2)
