@@ -211,6 +211,8 @@ def label_costs(
                     cost += np.float32(2.0)
                 elif extra[k] == 0:
                     cost -= np.float32(1.0)
+                if rest[y, x] == moving[k]:  # nothing if it is on the way
+                    cost += extra[k]
                 costs[2 + k, y, x] = min(cost, CAP)
             costs[2 + n, y, x] = p[1]
 

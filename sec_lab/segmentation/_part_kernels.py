@@ -275,6 +275,9 @@ def presence(
 
 @nb.njit(cache=True, nogil=True)
 def uncovered(
+    image: Lab,
+    before: Lab,
+    moved_by: int,
     slots: Slots,
     rest: Slots,
     carried: NDArray[np.bool_],
@@ -286,8 +289,9 @@ def uncovered(
 ) -> int:
     """Pixels of carried segments where these rested, that look otherwise than at rest: something below comes to light.
 
-    ``still`` (height, width) becomes for how long they have been still, in frames up to ``wait_frames``, 0 elsewhere.
-    The number of those that have been for as long as that is returned.
+    ``still`` (height, width) becomes for how long they have been still, in frames up to ``wait_frames``; 0 elsewhere,
+    and where something moves in this very frame, of which ``resting_for`` does not know yet. The number of those that
+    have been for as long as that is returned.
     """
     height, width = slots.shape
     n = 0
@@ -296,6 +300,8 @@ def uncovered(
             slot = slots[y, x]
             still[y, x] = 0
             if carried[slot] and rest[y, x] == slot and static_cost[y, x] > strange_cost:
+                if abs(np.int64(image[y, x, 0]) - np.int64(before[y, x, 0])) > moved_by:
+                    continue
                 still[y, x] = min(resting_for[y, x], wait_frames)
                 n += resting_for[y, x] >= wait_frames
     return n

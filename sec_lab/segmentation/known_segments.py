@@ -19,6 +19,10 @@ CLEARLY = 2.0
 SURELY = 1.0
 """By so much where its place speaks for it, too, or where it fits well by itself."""
 
+_NEVER = -(1 << 40)
+_JUST_MOVED_FRAMES = 50
+"""Two seconds in which parts that a hand has hidden still come to light, after what it has carried has come to rest."""
+
 LEAST_TAUGHT_PX = 30
 """A segment must show more pixels for its colours to be learned: the rims of a smaller one are mixed with others."""
 
@@ -45,15 +49,15 @@ class KnownSegments:
     parted_off : bool
         It lay below another segment, which was lifted off it.
     hidden, missing, present : bool
-        Little of it, not all of it, something of it is to be seen.
+        Little of it is to be seen; not all of it, nor is the rest behind a mover; something of it is.
     tables : (256, N_BINS) float32
         Cost of every colour under it.
     boxes : (256, 4) int64
         Top, left, bottom, right where it was last seen; -1 before.
     most_px : int64
         Largest area seen.
-    born : int64
-        Step in which it was found.
+    born, moved_at : int64
+        Step in which it was found, and the last one in which it was on the way, far below 0 if it never was.
     labels : uint16
         Label that it has for the reader, 0 for none.
     """
@@ -78,6 +82,7 @@ class KnownSegments:
         self.boxes = np.full((N_SLOTS, 4), -1, np.int64)
         self.most_px = np.zeros(N_SLOTS, np.int64)
         self.born = np.zeros(N_SLOTS, np.int64)
+        self.moved_at = np.full(N_SLOTS, _NEVER, np.int64)
         self.labels = np.zeros(N_SLOTS, dtype=np.uint16)
         self._next_label = 1
         self.n_steps = 0
@@ -134,6 +139,7 @@ class KnownSegments:
         self.tables[slot] = kernels.CAP
         self.most_px[slot] = 0
         self.boxes[slot] = -1
+        self.moved_at[slot] = _NEVER
 
     def learn(self, bins: NDArray[np.uint16], slots: Slots, taught: Slots, wanted: Flags) -> None:
         """Learn the colours of the wanted slots where they are taught; ``bins`` as of :func:`colour_bins`."""
@@ -166,8 +172,6 @@ class KnownSegments:
         self.present = visible > 0
         self.most_px = np.maximum(visible, self.most_px)
         self.hidden = self.known & (visible < 0.3 * self.most_px)
-        self.missing = self.known & ~self.mover & (visible < 0.8 * self.most_px)
-        self.missing[:2] = False
         vacated = resting - recognised - covered
         bound = np.maximum(8, 0.12 * resting)
         starts = (resting > 0) & ((vacated > bound) | (self.touched & (elsewhere > bound)))
@@ -175,8 +179,18 @@ class KnownSegments:
         self.moving = (self.moving & ~ends) | starts
         self.moving[:2] = False
         self.moving &= self.known
+        self.moved_at[self.moving] = self.n_steps
+        # Of what is where it rests, nothing is missing behind a mover.
+        there = visible + np.where(self.moving, 0, covered)
+        self.missing = self.known & ~self.mover & (there < 0.8 * self.most_px)
+        self.missing[:2] = False
         self.touched &= self.known & ~self.mover
         self.touched[:2] = False
+
+    @property
+    def just_moved(self) -> Flags:
+        """Segments that are, or have just been, on the way."""
+        return np.asarray(self.moved_at > self.n_steps - _JUST_MOVED_FRAMES)
 
     def young(self, slot: Any) -> bool:
         """Whether a mover has come in only now, so that most of it is still to be seen for the first time."""
@@ -194,13 +208,13 @@ class KnownSegments:
         close = np.flatnonzero(self.mover & self.present & self.close_to(box))
         return int(close[0]) if len(close) else 0
 
-    def found_again(self, fits: NDArray[np.float32], slots: Slots) -> int:
-        """A mover that has left and comes in again, of the same colours; 0 if there is none.
+    def found_again(self, fits: NDArray[np.float32], colour: NDArray[np.float32], slots: Slots) -> int:
+        """A mover that has left and comes in again, of the same colours, young once more; 0 if there is none.
 
         Parameters
         ----------
-        fits : (256,) float32
-            Share of what comes in that fits to the colours of each slot.
+        fits, colour : (256,) float32
+            Share of what comes in that fits to the colours of each slot, and its mean cost under them.
         slots : (height, width) uint8
         """
         lost = self.mover & self.known
@@ -208,7 +222,18 @@ class KnownSegments:
         # A hand that brings something is of other colours in part.
         fitting = np.where(lost, fits, 0)
         best = int(np.argmax(fitting))
-        return best if fitting[best] > 0.4 else 0
+        if fitting[best] <= 0.4:
+            # What is seen of it first may lie in its own shadow.
+            best = int(np.argmin(np.where(lost, colour, np.inf)))
+            if not (lost[best] and self.most_like(best, colour)):
+                return 0
+        self.born[best] = self.n_steps
+        return best
+
+    def most_like(self, slot: int, colour: NDArray[np.float32]) -> bool:
+        """Whether colours, of mean cost ``colour`` (256,), are hardly of a segment, but surely less of any other."""
+        others = np.delete(np.where(self.known, colour, np.inf), slot)
+        return bool(colour[slot] < min(self._p.unknown_cost, others.min()) - SURELY)
 
     def of_one_hue(self, colours: NDArray[np.uint16], slot: int, beside: NDArray[Any]) -> list[int]:
         """The segment of whose hue a part is, in any light, that comes to light from below another one; none or one.

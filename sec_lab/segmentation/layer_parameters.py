@@ -86,7 +86,8 @@ class LayerParameters:
         Distance up to which a segment is near by, as a share of the longer side: 26 pixels of 320×256, a hand's step in
         two or three frames.
     touched_cost : float, optional
-        Of what rests and is next to a mover, elsewhere than where it rests: it may be taken, but is not yet.
+        Of what rests and is next to a mover, elsewhere than where it rests: it may be taken, but is not yet. Twice that
+        where it rests: what looks otherwise there is mostly something before it.
     young_frames : int, optional
         Frames for which a mover that has just come in takes in unknown colours next to it: half a second, in which a
         hand and its arm come to be seen.

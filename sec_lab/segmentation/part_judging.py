@@ -168,8 +168,12 @@ class Judge:
         p, segments = self.parameters, self.segments
         # Where a segment has gone away, what it lay on comes to light.
         gone = segments.moving & ~segments.mover & (part.around < 0.2)
-        if part.below[gone].sum() > 0.5 and part.colour[1] < p.fitting_cost + 0.5:
-            return UNTAUGHT + 1
+        if part.below[gone].sum() > 0.5:
+            if part.colour[1] < p.fitting_cost + 0.5:
+                return UNTAUGHT + 1
+            support = int(np.argmax(part.around))
+            if support and part.around[support] > 0.5 and segments.most_like(support, part.colour):
+                return UNTAUGHT + support
         if self._is_ground(part):
             return UNTAUGHT + 1
         best, least, fits = 0, np.inf, False
@@ -184,9 +188,12 @@ class Judge:
             # A segment of which much is missing takes what is next to it, even in another light.
             lacking = bool(segments.missing[slot]) and part.around[slot] > _LARGELY_BESIDE
             fitting = part.colour[slot] < p.fitting_cost + (_LACKING if lacking else 0)
+            under_way = bool(segments.mover[slot] or segments.just_moved[slot])
+            # Mixed colours of a rim may be like a third thing: orange and white make skin.
+            fitting |= under_way and part.thick and segments.most_like(int(slot), part.colour)
             near = part.around[slot] > _BESIDE or part.guess[slot] > _EXPECTED
             grows = segments.mover[slot] and (fitting or enters or segments.young(slot))
-            if near and (grows or ((segments.moving[slot] or segments.missing[slot]) and fitting)):
+            if near and (grows or ((segments.just_moved[slot] or segments.missing[slot]) and fitting)):
                 score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
             elif part.colour[slot] < p.fitting_cost - SURELY:
                 score = part.colour[slot] + (_COME_TO_LIGHT if segments.hidden[slot] else _ELSEWHERE)
@@ -201,8 +208,10 @@ class Judge:
         if best and (fits or part.border or segments.young(best)):
             segments.moving[best] = True
             return best
+        if part.border and not part.thick and part.around[segments.mover].sum() > _LARGELY_BESIDE:
+            return UNTAUGHT + self.absorbing(part)
         if part.border and part.area >= 2 * self.new_px:
-            return segments.found_again(part.fits, self.slots) or self._new(part, mover=True)
+            return segments.found_again(part.fits, part.colour, self.slots) or self._new(part, mover=True)
         if not part.border and part.unknown_for >= p.wait_frames:
             return self._put(part)
         return UNTAUGHT + self.absorbing(part)
@@ -217,7 +226,7 @@ class Judge:
         fitting[self.segments.hidden] -= _ELSEWHERE - _COME_TO_LIGHT
         fitting[self.segments.missing & (part.around > 0.15)] -= _LACKING
         best = int(np.argmin(fitting))
-        if fitting[best] < self.parameters.fitting_cost - 1.5:
+        if fitting[best] < self.parameters.fitting_cost - 1.5 or self.segments.most_like(best, part.colour):
             return best
         return self._put(part)
 
@@ -225,15 +234,21 @@ class Judge:
         """Whether a part is of a segment that is hidden, or that lacks it here: nothing else is nearly so like it."""
         segments = self.segments
         bound = self.parameters.unknown_cost
-        others = np.ones_like(segments.known)
+        others = self._may_be_here(part)
         if segments.missing[slot] and part.around[slot] > _LARGELY_BESIDE:
             bound += CLEARLY
             others = part.around > _HARDLY_BESIDE
-        elif not segments.hidden[slot]:
+        elif segments.mover[slot] or not segments.hidden[slot]:
             return False
         others[slot] = False
         fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - CLEARLY)
         return bool(fits and part.area < 1.2 * segments.most_px[slot])
+
+    def _may_be_here(self, part: Part) -> NDArray[np.bool_]:
+        """Slots that a part may be of: not those that rest elsewhere, untouched and wholly to be seen."""
+        segments = self.segments
+        elsewhere = ~(segments.moving | segments.touched | segments.hidden | segments.missing)
+        return np.asarray(segments.known & (~elsewhere | (part.around > _HARDLY_BESIDE)))
 
     def _is_ground(self, part: Part) -> bool:
         """Whether a part lies in the background and has its colours: other light, no other thing."""
@@ -249,9 +264,9 @@ class Judge:
             below = int(np.argmax(np.where(lifted, part.below, 0)))
             for slot in self.segments.of_one_hue(part.colours(), below, np.flatnonzero(part.around > _HARDLY_BESIDE)):
                 return slot
-        lacking = self._lacking(part)
-        if lacking:
-            return UNTAUGHT + lacking
+        whole = self._lacking(part) or self._unsettled(part)
+        if whole:
+            return UNTAUGHT + whole
         hand = float(part.around[self.segments.mover].sum())
         large = part.area >= self.new_px and part.thick
         if large and (hand < 0.3 or part.area >= 4 * self.new_px):
@@ -259,12 +274,35 @@ class Judge:
         return UNTAUGHT + self.absorbing(part)
 
     def _lacking(self, part: Part) -> int:
-        """A segment on the way that surrounds most of a part and lacks more than half as much; 0 if there is none."""
+        """A segment, carried just now, that lacks more than half as much as a part that it is around; 0 if none does.
+
+        If it is around less than half of it, nothing else beside the part is as much like it.
+        """
         segments = self.segments
-        now = np.bincount(self.slots.ravel(), minlength=N_SLOTS)
-        lacks = segments.missing & segments.moving & (segments.most_px - now > part.area / 2)
-        lacks &= (part.around > 0.5) & (part.colour < self.parameters.unknown_cost + CLEARLY)
+        now = np.bincount(self.slots.ravel(), minlength=N_SLOTS) - part.guess * part.area
+        lacks = segments.just_moved & ~segments.mover & (segments.most_px - now > part.area / 2)
+        beside = part.colour[(part.around > _HARDLY_BESIDE) & ~segments.mover].min(initial=np.inf)
+        lacks &= (part.around > 0.5) | ((part.around > _LARGELY_BESIDE) & (part.colour <= beside))
+        lacks &= part.colour < self.parameters.unknown_cost + CLEARLY
         return int(np.argmax(np.where(lacks, part.around, 0)))
+
+    def _unsettled(self, part: Part) -> int:
+        """A segment, carried just now, beside a part that is like no other one nearly as much, or all around; else 0.
+
+        Its outline has been what the hand left of it to be seen.
+        """
+        segments = self.segments
+        cost = np.where(segments.known & ~segments.mover, part.colour, np.inf)
+        moved = segments.just_moved & np.isfinite(cost)
+        moved[:2] = False
+        best = int(np.argmin(cost))
+        others = self._may_be_here(part)
+        others[best] = False
+        bound = min(self.parameters.unknown_cost + CLEARLY, cost[others].min(initial=np.inf) - CLEARLY)
+        if moved[best] and part.area < segments.most_px[best] and part.around[best] > _BESIDE and cost[best] < bound:
+            return best
+        moved &= (part.around > 0.8) & (part.area < 0.25 * segments.most_px)
+        return int(np.argmax(np.where(moved, part.around, 0)))
 
     def absorbing(self, part: Part) -> int:
         """Slot that a part falls to which is too small, or not to be explained yet."""

@@ -89,8 +89,10 @@ class Layers:
             found, relaxed = relaxed, found
         slots = found.copy()
         self._judge(slots, taught, predicted, lab, bins)
-        self._part_off(slots, taught, costs[0], bins)
-        _part_kernels.close_rims(slots, self.rest, costs, segments.moving, np.float32(p.unknown_cost), _RIM_PX, taught)
+        self._part_off(slots, taught, costs[0], lab, bins)
+        _part_kernels.close_rims(
+            slots, self.rest, costs, segments.just_moved, np.float32(p.unknown_cost), _RIM_PX, taught
+        )
         movers_there = segments.mover[slots].any()
         if not movers_there:
             self._visit = segments.n_steps
@@ -252,7 +254,7 @@ class Layers:
         _part_kernels.recolour(parts.where, new, slots, taught)
 
     def _part_off(
-        self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32], bins: NDArray[np.uint16]
+        self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32], lab: Lab, bins: NDArray[np.uint16]
     ) -> None:
         """Make a segment of what lay below another one that was lifted off it: two things, taken for one so far."""
         import cv2
@@ -267,7 +269,17 @@ class Layers:
         still = np.empty_like(slots)
         wait = p.wait_frames // 2
         n = _part_kernels.uncovered(
-            slots, self.rest, carried, static_cost, p.unknown_cost, self._resting_for, wait, still
+            lab,
+            self.image,
+            p.moved_by,
+            slots,
+            self.rest,
+            carried,
+            static_cost,
+            p.unknown_cost,
+            self._resting_for,
+            wait,
+            still,
         )
         if n < self._new_px:
             return

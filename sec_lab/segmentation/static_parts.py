@@ -17,6 +17,7 @@ _SOLID = 0.8
 _OTHER_HUE, _SAME_HUE = 25.0, 5.0
 _BRIGHTER = 10.0
 _AT_BORDER = 0.15
+_NEAR_BORDER = 0.15
 _A_SIDE = 0.1
 
 
@@ -215,7 +216,7 @@ def with_coloured_parts(
                     parted[piece] = BACKGROUND
                     continue
                 lower = rise is not None and _is_lower(rise, piece, region)
-                strip = _is_strip(piece) and not _is_band(piece, region)
+                strip = _is_strip(piece) and not _is_band(piece, region) and _near_border(piece, labels)
                 if not _is_solid(piece) or _at_border(piece, labels) or not (lower or strip):
                     continue
             number += 1
@@ -254,6 +255,12 @@ def _at_border(piece: NDArray[np.bool_], labels: Labels) -> bool:
     """Whether the background is next to much of a piece."""
     around = _dilated(piece, 3) & ~piece
     return bool((labels[around] == BACKGROUND).mean() >= _AT_BORDER)
+
+
+def _near_border(piece: NDArray[np.bool_], labels: Labels) -> bool:
+    """Whether the background begins a few pixels beyond a piece: pages show at an edge, a title amid its cover."""
+    around = _dilated(piece, 15) & ~piece
+    return bool((labels[around] == BACKGROUND).mean() >= _NEAR_BORDER)
 
 
 def _is_solid(part: NDArray[np.bool_]) -> bool:

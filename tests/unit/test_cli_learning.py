@@ -1,7 +1,7 @@
 """``sec-lab learn`` and ``sec-lab find``."""
 
-import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from sec_lab.cli import main
 from sec_lab.graphml import read_model
 from sec_lab.observation import Observation
 from sec_lab.scene_graph import SceneGraph
-from sec_lab.worlds.drawn import moving_object
 
+DATASETS = Path(__file__).parents[2] / "datasets" / "tabletop_actions"
 PUTTING = {(1, 2): [0, 2, 2, 0], (2, 3): [0, 0, 2, 2]}
 
 
@@ -72,13 +72,13 @@ def test_find_says_when_an_action_begins_and_ends(chains, tmp_path, capsys):
 @pytest.mark.slow
 def test_find_in_a_stereo_movie(tmp_path, capsys):
     """Two files or side by side: the same is found; online it is told in the frame in which it happens."""
-    left = moving_object(1).frames[::2, ::2, ::2]
-    right = np.roll(left, -4, axis=2)
+    folder = DATASETS / "moving_object_2_laboratory"
+    left, right = (
+        np.stack([frame.image for frame in sl.Recording.open(folder / f"{name}.mp4")]) for name in ("left", "right")
+    )
     for name, frames in (("left", left), ("right", right), ("both", np.concatenate([left, right], axis=2))):
         recording.write_movie(tmp_path / f"{name}.mkv", frames, frames_per_second=25, lossless=True)
-    camera = {"focal_length_px": 200.0, "principal_point_px": [79.5, 63.5], "baseline_m": 0.1}
-    (tmp_path / "camera.json").write_text(json.dumps(camera))
-    calibration = ["--calibration", str(tmp_path / "camera.json")]
+    calibration = ["--calibration", str(folder / "calibration.json")]
     pair = [str(tmp_path / "left.mkv"), "--right", str(tmp_path / "right.mkv"), *calibration]
     one, two, model = (str(tmp_path / name) for name in ("one.graphml", "two.graphml", "moving.graphml"))
     assert main(["observe", *pair, "-o", one]) == 0

@@ -265,8 +265,10 @@ def test_uncovered(size: tuple[int, int], seed: int) -> None:
     cost = rng.choice([4, 12, 12.5], size).astype(np.float32)
     resting_for = rng.choice([0, 1, 3, 4, 200], size).astype(np.uint8)
     still = np.full(size, 77, np.uint8)
-    n = _part_kernels.uncovered(slots, rest, carried, cost, 12.0, resting_for, 4, still)
-    is_one = (slots == 2) & (rest == 2) & (cost > 12)
+    before = rng.integers(90, 160, (*size, 3)).astype(np.uint8)
+    image = before + rng.integers(0, 12, before.shape).astype(np.uint8)
+    n = _part_kernels.uncovered(image, before, 8, slots, rest, carried, cost, 12.0, resting_for, 4, still)
+    is_one = (slots == 2) & (rest == 2) & (cost > 12) & (image[..., 0] - before[..., 0] <= 8)
     np.testing.assert_array_equal(still, np.where(is_one, np.minimum(resting_for, 4), 0))
     assert n == (is_one & (resting_for >= 4)).sum()
 

@@ -159,6 +159,10 @@ class TestPartsOfAnotherHue:
         assert len({int(pages), int(cover), 1}) == 3
         assert ((found == pages) & (truth == 2)).sum() > 0.75 * (truth == 2).sum()
 
+    def test_a_title_amid_the_cover_is_none(self) -> None:
+        found, _ = self.segments(Block((44, 60), self.WHITE, 6, 32))
+        assert set(np.unique(found)) == {1, 2}
+
     def test_a_band_that_runs_across_is_none(self) -> None:
         found, _ = self.segments(Block((48, 60), self.WHITE, 9, 52))
         assert set(np.unique(found)) == {1, 2}
