@@ -232,8 +232,11 @@ class KnownSegments:
 
     def most_like(self, slot: int, colour: NDArray[np.float32]) -> bool:
         """Whether colours, of mean cost ``colour`` (256,), are hardly of a segment, but surely less of any other."""
-        others = np.delete(np.where(self.known, colour, np.inf), slot)
-        return bool(colour[slot] < min(self._p.unknown_cost, others.min()) - SURELY)
+        if colour[slot] >= self._p.unknown_cost - SURELY:
+            return False
+        others = self.known.copy()
+        others[slot] = False
+        return bool(colour[slot] < colour[others].min(initial=np.inf) - SURELY)
 
     def of_one_hue(self, colours: NDArray[np.uint16], slot: int, beside: NDArray[Any]) -> list[int]:
         """The segment of whose hue a part is, in any light, that comes to light from below another one; none or one.

@@ -182,18 +182,19 @@ class Judge:
         asked = (part.around > _HARDLY_BESIDE) | (part.guess > _EXPECTED) | segments.close_to(part.box)
         # What was carried under a hand comes to light far from where it was last seen.
         asked |= segments.hidden & ~segments.mover
+        just_moved = segments.just_moved
         for slot in np.flatnonzero(asked):
             if slot <= 1 or not segments.known[slot]:
                 continue
             # A segment of which much is missing takes what is next to it, even in another light.
             lacking = bool(segments.missing[slot]) and part.around[slot] > _LARGELY_BESIDE
             fitting = part.colour[slot] < p.fitting_cost + (_LACKING if lacking else 0)
-            under_way = bool(segments.mover[slot] or segments.just_moved[slot])
             # Mixed colours of a rim may be like a third thing: orange and white make skin.
-            fitting |= under_way and part.thick and segments.most_like(int(slot), part.colour)
+            if not fitting and part.thick and (segments.mover[slot] or just_moved[slot]):
+                fitting = segments.most_like(int(slot), part.colour)
             near = part.around[slot] > _BESIDE or part.guess[slot] > _EXPECTED
             grows = segments.mover[slot] and (fitting or enters or segments.young(slot))
-            if near and (grows or ((segments.just_moved[slot] or segments.missing[slot]) and fitting)):
+            if near and (grows or ((just_moved[slot] or segments.missing[slot]) and fitting)):
                 score = part.colour[slot] + _OUT_OF_PLACE * (1 - max(min(1.0, 2 * part.around[slot]), part.guess[slot]))
             elif part.colour[slot] < p.fitting_cost - SURELY:
                 score = part.colour[slot] + (_COME_TO_LIGHT if segments.hidden[slot] else _ELSEWHERE)
