@@ -373,3 +373,22 @@ def test_a_rim_between_a_hand_and_what_it_holds_is_closed_and_a_gap_is_not() -> 
         costs = np.full((2, *slots.shape), strange, np.float32)
         _part_kernels.close_rims(closed, rest, costs, moving, np.float32(12), 3, np.ones_like(slots))
         assert closed[0].tolist() == expected
+
+
+def test_what_looks_otherwise_where_a_touched_thing_rests_is_hardly_that_thing() -> None:
+    """``extra`` counts once elsewhere and twice where it rests; on the way it costs 1 less where it is expected."""
+    rest = np.array([[2, 1]], np.uint8)
+    grey = np.full((1, 2, 3), 128, np.uint8)
+    seen, flat = grey.astype(np.float32), np.zeros((1, 2), np.float32)
+    tables = np.full((256, kernels.N_BINS), 5, np.float32)
+    parameters = np.array([4.2, 12, 3, 1.4, 5, 6, 2, 1.5], np.float32)
+    found = {}
+    for extra in (0.0, 2.0):
+        costs = np.empty((4, 1, 2), np.float32)
+        kernels.label_costs(
+            grey, kernels.colour_bins(grey), rest, seen, seen, flat, flat + 1, rest, np.full((1, 2), 2, np.uint32),
+            np.array([2], np.uint8), np.full(1, 16, np.float32), np.array([extra], np.float32), tables, parameters,
+            costs,
+        )  # fmt: skip
+        found[extra] = costs[2, 0].tolist()
+    assert found == {0.0: [4.0, 4.0], 2.0: [9.0, 7.0]}
