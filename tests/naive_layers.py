@@ -303,3 +303,36 @@ def naive_rims(
                 nearest = min(far, away)
                 closed[y, x] = one if far <= away else other
     return closed
+
+
+def naive_shared_out(slots: Image, bins: NDArray[np.integer], tables: NDArray[np.float32]) -> Image:
+    """Slots after what is unknown was given to its neighbours, ring after ring: the most frequent, then the likest."""
+    given = slots.copy()
+    while (given == 0).any():
+        ring = {}
+        for y, x in np.argwhere(given == 0):
+            around = given[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].ravel().tolist()
+            counts = Counter(slot for slot in around if slot)
+            if counts:
+                order = list(counts)
+                ring[y, x] = min(order, key=lambda slot: (-counts[slot], tables[slot, bins[y, x]], order.index(slot)))
+        if not ring:
+            return np.ones_like(slots)
+        for place, slot in ring.items():
+            given[place] = slot
+    return given
+
+
+def naive_difference(
+    colour: Image, base: NDArray[np.float32], brightest: float, p: NDArray[np.float32], extra: float
+) -> float:
+    """Cost of a colour where another one was seen before: the best shade of it, and what is left beside that."""
+    now, before = (np.asarray(lab, np.float64) + np.array([16, -128, -128]) for lab in (colour, base))
+    shade = min(max(now @ before / (before @ before), 0.62), brightest)
+    off = 1 - shade if shade <= 1 else (shade - 1) / 2
+    sigmas = p[2:4] + extra * np.array([1, 0.5]) + p[4] * off
+    left = (now - shade * before) / sigmas[[0, 1, 1]]
+    cost = p[0] + left @ left / 2
+    if sigmas[1] > 1.02 * p[3]:
+        cost += 2 * math.log(sigmas[1] / p[3])
+    return float(cost + p[5] * max(0.98 - shade, 0, shade - 1.03))

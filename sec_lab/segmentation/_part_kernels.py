@@ -176,6 +176,49 @@ def recolour(parts: NDArray[np.int32], new: NDArray[np.int64], slots: Slots, tau
 
 
 @nb.njit(cache=True, nogil=True)
+def share_out(slots: Slots, taught: NDArray[np.uint8], bins: NDArray[np.uint16], tables: Floats) -> None:
+    """Give every unknown pixel to the segment nearest to it: the one that surrounds it most, or is more like it.
+
+    From the rim inwards, a pixel at a time; what is given so is not taught. A picture of nothing else is background.
+    """
+    height, width = slots.shape
+    rows, columns = np.nonzero(slots == UNKNOWN)
+    given = np.empty(rows.size, np.uint8)
+    count = np.zeros(256, np.int64)
+    left = rows.size
+    while left > 0:
+        for i in range(left):
+            y, x = rows[i], columns[i]
+            best, most, least = UNKNOWN, 0, np.float32(0)
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    count[slots[v, u]] += 1
+            count[UNKNOWN] = 0
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    slot = slots[v, u]
+                    cost = tables[slot, bins[y, x]]
+                    if count[slot] > most or (count[slot] == most > 0 and cost < least):
+                        best, most, least = slot, count[slot], cost
+                    count[slot] = 0
+            given[i] = best
+        still = 0
+        for i in range(left):
+            y, x = rows[i], columns[i]
+            if given[i] == UNKNOWN:
+                rows[still], columns[still] = y, x
+                still += 1
+            else:
+                slots[y, x] = given[i]
+                taught[y, x] = 0
+        if still == left:
+            slots[:] = BACKGROUND
+            taught[:] = 0
+            return
+        left = still
+
+
+@nb.njit(cache=True, nogil=True)
 def settle(
     image: Lab,
     before: Lab,

@@ -252,6 +252,7 @@ class Layers:
             else:
                 new[at] = UNTAUGHT + judge.absorbing(part)
         _part_kernels.recolour(parts.where, new, slots, taught)
+        _part_kernels.share_out(slots, taught, bins, segments.tables)
 
     def _part_off(
         self, slots: Slots, taught: Slots, static_cost: NDArray[np.float32], lab: Lab, bins: NDArray[np.uint16]

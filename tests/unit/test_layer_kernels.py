@@ -16,11 +16,13 @@ from tests.naive_layers import (
     naive_components,
     naive_counts,
     naive_describe,
+    naive_difference,
     naive_presence,
     naive_recoloured,
     naive_relaxed,
     naive_rims,
     naive_settled,
+    naive_shared_out,
     naive_surroundings,
     naive_warped,
 )
@@ -364,6 +366,28 @@ def test_close_rims(size: tuple[int, int], seed: int) -> None:
     np.testing.assert_array_equal(taught == 0, closed != slots)
 
 
+@given(SIZES, SEEDS)
+@example((9, 9), 0)
+def test_share_out(size: tuple[int, int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    slots = labels(rng, size, [0, 0, 0, 1, 2, 3])
+    bins = rng.integers(0, 4, size).astype(np.uint16)
+    tables = rng.choice(np.array([5, 9, 16], np.float32), (256, 4))
+    shared, taught = slots.copy(), np.ones(size, np.uint8)
+    _part_kernels.share_out(shared, taught, bins, tables)
+    np.testing.assert_array_equal(shared, naive_shared_out(slots, bins, tables))
+    np.testing.assert_array_equal(taught == 0, slots == 0)
+
+
+def test_a_rim_is_shared_by_the_nearest_and_in_the_middle_it_goes_to_the_likest() -> None:
+    tables = np.full((256, 2), 16, np.float32)
+    tables[3, 1] = 4
+    for colour, expected in ((0, [2, 2, 2, 2, 3, 3, 3]), (1, [2, 2, 2, 3, 3, 3, 3])):
+        slots = np.array([[2, 2, 0, 0, 0, 3, 3]], np.uint8)
+        _part_kernels.share_out(slots, np.ones_like(slots), np.full(slots.shape, colour, np.uint16), tables)
+        assert slots[0].tolist() == expected
+
+
 def test_a_rim_between_a_hand_and_what_it_holds_is_closed_and_a_gap_is_not() -> None:
     slots = np.array([[2, 2, 1, 1, 3, 3]], np.uint8)
     rest = np.ones_like(slots)
@@ -373,6 +397,42 @@ def test_a_rim_between_a_hand_and_what_it_holds_is_closed_and_a_gap_is_not() -> 
         costs = np.full((2, *slots.shape), strange, np.float32)
         _part_kernels.close_rims(closed, rest, costs, moving, np.float32(12), 3, np.ones_like(slots))
         assert closed[0].tolist() == expected
+
+
+@given(SIZES, SEEDS, st.lists(st.integers(2, 5), unique=True))
+def test_label_costs(size: tuple[int, int], seed: int, moving_slots: list[int]) -> None:
+    rng = np.random.default_rng(seed)
+    moving = np.array(moving_slots, np.uint8)
+    rest, predicted = (labels(rng, size, [1, 2, 3, 4, 5]) for _ in range(2))
+    image = rng.integers(100, 160, (*size, 3)).astype(np.uint8)
+    seen, behind = (rng.uniform(100, 160, (*size, 3)).astype(np.float32) for _ in range(2))
+    behind_sigma = rng.choice(np.array([0, 4], np.float32), size)
+    brightest = rng.choice(np.array([1.05, 1.45], np.float32), size)
+    near = rng.integers(0, 3, (*size, len(moving)))
+    far = rng.choice(np.array([3, 5, 16], np.float32), len(moving))
+    extra = rng.choice(np.array([0, 2], np.float32), len(moving))
+    tables = rng.uniform(4, 16, (256, kernels.N_BINS)).astype(np.float32)
+    p = np.array([4.2, 12, 3, 1.4, 5, 6, 2, 1.5], np.float32)
+    bins = kernels.colour_bins(image)
+    codes = sum((near[..., k].astype(np.uint32) << np.uint32(2 * k) for k in range(len(moving))), np.zeros(size, int))
+    costs = np.empty((3 + len(moving), *size), np.float32)
+    kernels.label_costs(
+        image, bins, rest, seen, behind, behind_sigma, brightest, predicted, codes.astype(np.uint32), moving, far,
+        extra, tables, p, costs,
+    )  # fmt: skip
+    for y, x in np.ndindex(*size):
+        resting, expected_here = rest[y, x], predicted[y, x]
+        same = naive_difference(image[y, x], seen[y, x], brightest[y, x], p, 0)
+        bare = naive_difference(image[y, x], behind[y, x], 1.05, p, behind_sigma[y, x])
+        expected = [
+            same + (p[6] if expected_here != resting else 0),
+            CAP if resting == 1 else p[7] + bare + (1.5 if expected_here != 1 else 0),
+        ]
+        for k, slot in enumerate(moving_slots):
+            place = [far[k], 2.0, 0.0 if extra[k] else -1.0][near[y, x, k]]
+            cost = tables[slot, bins[y, x]] + place + extra[k] * (2 if resting == slot else 1)
+            expected.append(CAP if near[y, x, k] == 0 and far[k] >= CAP else cost)
+        np.testing.assert_allclose(costs[:, y, x], np.minimum([*expected, p[1]], CAP), rtol=2e-3)
 
 
 def test_what_looks_otherwise_where_a_touched_thing_rests_is_hardly_that_thing() -> None:

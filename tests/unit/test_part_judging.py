@@ -132,9 +132,18 @@ def test_a_hand_in_its_own_shade_is_most_like_a_hand() -> None:
     shaded = part({PLATE: 0.75, hand: 0.25}, {PLATE: 1.0}, {hand: 10.5, PLATE: 12.0}, unknown_for=0)
     assert judge.unknown(shaded) == hand
     rim = part({PLATE: 0.75, hand: 0.25}, {PLATE: 1.0}, {hand: 10.5, PLATE: 12.0}, unknown_for=0, thick=False)
-    assert judge.unknown(rim) == UNTAUGHT + PLATE
+    assert judge.unknown(rim) == UNTAUGHT
     as_like_the_plate = part({PLATE: 0.75, hand: 0.25}, {PLATE: 1.0}, {hand: 10.5, PLATE: 11.0}, unknown_for=0)
     assert judge.unknown(as_like_the_plate) == UNTAUGHT + PLATE
+
+
+def test_a_rim_is_of_all_that_it_lies_between_and_a_patch_of_one() -> None:
+    _, judge = scene()
+    between: tuple[dict[int, float], ...] = ({CUP: 0.6, PLATE: 0.4}, {TABLE: 1.0}, {CUP: 13.0, PLATE: 13.0})
+    assert judge.absorbing(part(*between, thick=False)) == 0
+    assert judge.absorbing(part(*between)) == CUP
+    # What has been of a segment is not unknown.
+    assert judge.absorbing(part(*between, thick=False, slot=PLATE)) == CUP
 
 
 def test_a_hand_that_has_left_is_found_again_and_young() -> None:
@@ -151,7 +160,7 @@ def test_a_strip_along_a_hand_is_no_second_hand() -> None:
     _, judge, hand = with_hand()
     colour = {hand: 13.0, TABLE: 14.0}
     strip = part({TABLE: 0.5, hand: 0.5}, {TABLE: 1.0}, colour, border=True, thick=False)
-    assert judge.unknown(strip) == UNTAUGHT + TABLE
+    assert judge.unknown(strip) == UNTAUGHT
     assert judge.unknown(part({TABLE: 0.5, hand: 0.5}, {TABLE: 1.0}, colour, border=True)) > hand
 
 
