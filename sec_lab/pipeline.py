@@ -15,7 +15,7 @@ from sec_lab.codes import as_array
 from sec_lab.event_chain import Names
 from sec_lab.observation import Observation
 from sec_lab.recording import Calibration, Frame, Recording
-from sec_lab.recording.sharing import DepthOfFrame, shared, with_depth
+from sec_lab.recording.sharing import DepthOfFrame, read_ahead, shared, with_depth
 from sec_lab.relations import SegmentRelations, edge_count_relations, scan_line_relations
 from sec_lab.scene_graph import MainGraphs, main_graphs, scene_graph
 from sec_lab.segmentation import Segmentation, check_fit
@@ -222,6 +222,7 @@ def _segmented(
     movie: Recording, segmentation: SegmentationMethod | Segmentation
 ) -> tuple[Segmentation, Iterable[LabelledFrame]]:
     """The segmentation of a movie, and its label images with the depth of their frames."""
+    is_known = isinstance(segmentation, Segmentation)
     if isinstance(segmentation, Segmentation):
         check_fit(segmentation, movie)
         # Pictures are not looked at, so they need not be decoded where they bring no depth.
@@ -234,9 +235,12 @@ def _segmented(
             raise ValueError(
                 f"segmentation: expected a Segmentation from the function, got {type(segmentation).__name__}"
             )
-    if frames is None:
-        return segmentation, _without_depth(segmentation)
-    return segmentation, _with_depth_of(frames, segmentation, n_frames=movie.n_frames)
+    labelled = (
+        _without_depth(segmentation)
+        if frames is None
+        else _with_depth_of(frames, segmentation, n_frames=movie.n_frames)
+    )
+    return segmentation, labelled if is_known else read_ahead(labelled)
 
 
 def _with_stereo_depth(movie: Recording) -> Recording:

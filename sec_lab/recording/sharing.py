@@ -1,10 +1,12 @@
-"""One reading of a recording for two readers, and depth that is found while it is read."""
+"""One reading of a recording for two readers, what is made ahead of its reader, and depth that is found on the way."""
 
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,26 @@ if TYPE_CHECKING:
     from sec_lab.recording.record import Recording
 
 DepthOfFrame = Callable[[Frame], NDArray[np.float32]]
+_Item = TypeVar("_Item")
+_END = object()
+
+
+def read_ahead(items: Iterator[_Item]) -> Iterator[_Item]:
+    """The same items, each of which is made by a thread beside while the one before it is in use.
+
+    An error is raised where its item would have come. Nothing changes but the time: the items are made one after the
+    other, in their order.
+
+    Examples
+    --------
+    >>> list(read_ahead(iter("abc")))
+    ['a', 'b', 'c']
+    """
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        coming = beside.submit(next, items, _END)
+        while (item := coming.result()) is not _END:
+            coming = beside.submit(next, items, _END)
+            yield cast("_Item", item)
 
 
 def with_depth(recording: "Recording", start: Callable[[], DepthOfFrame]) -> "Recording":
@@ -75,6 +97,8 @@ class _Reading:
     def __init__(self, recording: "Recording") -> None:
         self._recording = recording
         self._source = recording.read()
+        # The two may read in threads of their own, see read_ahead.
+        self._one_by_one = threading.Lock()
         self._is_taken = self._has_left = False
         self._ahead: deque[Frame] = deque()
         self._behind: deque[Frame] = deque()
@@ -88,13 +112,13 @@ class _Reading:
     def _leading(self) -> Iterator[Frame]:
         try:
             while True:
-                if self._ahead:
-                    yield self._ahead.popleft()
-                    continue
-                frame = next(self._source, None)
-                if frame is None:
-                    return
-                self._behind.append(frame)
+                with self._one_by_one:
+                    if self._ahead:
+                        frame = self._ahead.popleft()
+                    elif (coming := next(self._source, None)) is not None:
+                        self._behind.append(frame := coming)
+                    else:
+                        return
                 yield frame
         finally:
             self._has_left = True
@@ -103,17 +127,18 @@ class _Reading:
     def beside(self) -> Iterator[Frame]:
         """The frames of the reading that the first reader is given."""
         while True:
-            if self._behind:
-                yield self._behind.popleft()
-                continue
-            frame = next(self._source, None)
-            if frame is None:
-                return
-            if not self._is_taken:
-                # Nobody may ever read: who comes later begins anew.
-                self._is_taken = self._has_left = True
-            if not self._has_left:
-                self._ahead.append(frame)
+            with self._one_by_one:
+                if self._behind:
+                    frame = self._behind.popleft()
+                elif (coming := next(self._source, None)) is not None:
+                    frame = coming
+                    if not self._is_taken:
+                        # Nobody may ever read: who comes later begins anew.
+                        self._is_taken = self._has_left = True
+                    if not self._has_left:
+                        self._ahead.append(frame)
+                else:
+                    return
             yield frame
 
 

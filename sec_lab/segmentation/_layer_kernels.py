@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Slots = NDArray[np.uint8]
 Lab = NDArray[np.uint8]
+Float = np.float32
 Floats = NDArray[np.float32]
 Integers = NDArray[np.int64]
 Measures = NDArray[np.float64]
@@ -29,10 +30,9 @@ CAP = np.float32(16.0)
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _bin(lightness: int, a: int, b: int) -> int:
-    scale = _MIDDLE / (lightness + 16.0) / _CHROMA_STEP
-    i = int((a - 128) * scale + 20.5)
-    j = int((b - 128) * scale + 14.5)
+def _bin(lightness: int, a: int, b: int, scales: Measures) -> int:
+    i = int((a - 128) * scales[lightness] + 20.5)
+    j = int((b - 128) * scales[lightness] + 14.5)
     i = min(max(i, 0), N_CHROMA - 1)
     j = min(max(j, 0), N_CHROMA - 1)
     return ((lightness >> 5) * N_CHROMA + i) * N_CHROMA + j
@@ -43,9 +43,13 @@ def colour_bins(image: Lab) -> NDArray[np.uint16]:
     """Bin of the colour histogram that each pixel falls into, (height, width) uint16."""
     height, width = image.shape[:2]
     found = np.empty((height, width), np.uint16)
+    scales = np.empty(256)
+    for lightness in range(256):
+        scales[lightness] = _MIDDLE / (lightness + 16.0) / _CHROMA_STEP
     for y in range(height):
         for x in range(width):
-            found[y, x] = _bin(np.int64(image[y, x, 0]), np.int64(image[y, x, 1]), np.int64(image[y, x, 2]))
+            colour = np.int64(image[y, x, 0]), np.int64(image[y, x, 1]), np.int64(image[y, x, 2])
+            found[y, x] = _bin(colour[0], colour[1], colour[2], scales)
     return found
 
 
@@ -99,19 +103,21 @@ def colour_costs(counts: Floats, costs: Floats) -> None:
     for i in range(N_BINS):
         smooth[i] = np.float32(0.85) * smooth[i] + np.float32(0.15) * wide[i]
     volume = np.float32(_LIGHTNESS_STEP * _CHROMA_STEP * _CHROMA_STEP)
+    level_weights = (np.float32(0.4), np.float32(0.24), np.float32(0.06))
+    values = np.empty(plane, np.float32)
     for level in range(N_LIGHTNESS):
         stretch = 2 * np.log(_MIDDLE / (level * _LIGHTNESS_STEP + 32.0))
         never = min(-np.log(_RARE) - stretch, CAP)
+        values[:] = 0
+        for other in range(max(0, level - 2), min(N_LIGHTNESS, level + 3)):
+            weight = level_weights[abs(other - level)]
+            for k in range(plane):
+                values[k] += weight * smooth[other * plane + k]
         for k in range(plane):
-            value = np.float32(0)
-            for other in range(max(0, level - 2), min(N_LIGHTNESS, level + 3)):
-                gap = abs(other - level)
-                weight = np.float32(0.4) if gap == 0 else (np.float32(0.24) if gap == 1 else np.float32(0.06))
-                value += weight * smooth[other * plane + k]
-            if value == 0:  # most colours, and logarithms are slow
+            if values[k] == 0:  # most colours, and logarithms are slow
                 costs[level * plane + k] = never
                 continue
-            density = np.float32(0.97) * value / (total * volume) + _RARE
+            density = np.float32(0.97) * values[k] / (total * volume) + _RARE
             costs[level * plane + k] = min(-np.log(density) - stretch, CAP)
 
 
@@ -136,31 +142,40 @@ def _spread(counts: Floats) -> Floats:
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _difference(
-    light: float, a: float, b: float, base: Floats, y: int, x: int, brightest: float, p: Floats, extra: float
-) -> float:
-    """Cost of a colour where another one was seen before, with a shadow on it or without (see LayerParameters)."""
-    light0, a0, b0 = base[y, x, 0] + np.float32(16), base[y, x, 1] - np.float32(128), base[y, x, 2] - np.float32(128)
-    light1, a1, b1 = light + np.float32(16), a - np.float32(128), b - np.float32(128)
+def _deviation(
+    now: tuple[Float, Float, Float],
+    before: tuple[Float, Float, Float],
+    brightest: Float,
+    p: tuple[Float, Float, Float, Float],
+    extra: Float,
+) -> tuple[Float, Float, Float]:
+    """Cost of a colour where another one was seen before, in the likeliest light; and the noise and shade of that."""
+    light0, a0, b0 = before[0] + np.float32(16), before[1] - np.float32(128), before[2] - np.float32(128)
+    light1, a1, b1 = now[0] + np.float32(16), now[1] - np.float32(128), now[2] - np.float32(128)
     shade = (light1 * light0 + a1 * a0 + b1 * b0) / (light0 * light0 + a0 * a0 + b0 * b0)
     shade = min(max(shade, np.float32(0.62)), brightest)
     off = np.float32(1) - shade
-    if off < 0:
-        off = np.float32(-0.5) * off
-    sigma_light = p[2] + extra + p[4] * off
-    sigma = p[3] + np.float32(0.5) * extra + p[4] * off
+    off = np.float32(-0.5) * off if off < 0 else off
+    sigma_light = p[1] + extra + p[3] * off
+    sigma = p[2] + np.float32(0.5) * extra + p[3] * off
     d0, d1, d2 = light1 - shade * light0, a1 - shade * a0, b1 - shade * b0
     cost = p[0] + np.float32(0.5) * (d0 * d0 / (sigma_light * sigma_light) + (d1 * d1 + d2 * d2) / (sigma * sigma))
-    if sigma > np.float32(1.02) * p[3]:  # most pixels are in no shadow, and logarithms are slow
-        cost += np.float32(2) * np.log(sigma / p[3])
+    return cost, sigma, shade
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _with_shade(cost: Float, sigma: Float, shade: Float, chroma_sigma: Float, shadow_cost: Float) -> Float:
+    """A cost and what the noise and the shade add to it (see LayerParameters)."""
+    if sigma > np.float32(1.02) * chroma_sigma:  # most pixels are in no shadow, and logarithms are slow
+        cost += np.float32(2) * np.log(sigma / chroma_sigma)
     if shade < np.float32(0.98):
-        cost += p[5] * (np.float32(0.98) - shade)
+        cost += shadow_cost * (np.float32(0.98) - shade)
     elif shade > np.float32(1.03):
-        cost += p[5] * (shade - np.float32(1.03))
+        cost += shadow_cost * (shade - np.float32(1.03))
     return cost
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def label_costs(
     image: Lab,
     bins: NDArray[np.uint16],
@@ -180,58 +195,84 @@ def label_costs(
 ) -> None:
     """Cost of every candidate at every pixel, ``costs`` (3 + n_moving, height, width).
 
-    Candidates: what rests here; the background that comes to light; each moving segment; something unknown.
+    Candidates: what rests here; the background that comes to light; each moving segment; something unknown. A row goes
+    through one short loop after the other, which the compiler turns into vector instructions where it can.
     """
     height, width = rest.shape
     n = moving.size
+    noise = (p[0], p[2], p[3], p[4])
+    now, before = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
+    sigmas, shades = np.empty(width, np.float32), np.empty(width, np.float32)
+    place_costs = np.empty(3, np.float32)
     for y in range(height):
         for x in range(width):
-            light, a, b = np.float32(image[y, x, 0]), np.float32(image[y, x, 1]), np.float32(image[y, x, 2])
-            cost = _difference(light, a, b, seen, y, x, brightest[y, x], p, np.float32(0))
+            for c in range(3):
+                now[c, x], before[c, x] = image[y, x, c], seen[y, x, c]
+        row = costs[0, y]
+        for x in range(width):
+            row[x], sigmas[x], shades[x] = _deviation(
+                (now[0, x], now[1, x], now[2, x]),
+                (before[0, x], before[1, x], before[2, x]),
+                brightest[y, x],
+                noise,
+                np.float32(0),
+            )
+        for x in range(width):
+            cost = _with_shade(row[x], sigmas[x], shades[x], p[3], p[5])
             if predicted[y, x] != rest[y, x]:
                 cost += p[6]
-            costs[0, y, x] = min(cost, CAP)
+            row[x] = min(cost, CAP)
+        row = costs[1, y]
+        for x in range(width):
+            row[x] = CAP
             if rest[y, x] == BACKGROUND:
-                costs[1, y, x] = CAP
-            else:
-                cost = p[7] + _difference(light, a, b, behind, y, x, np.float32(1.05), p, behind_sigma[y, x])
-                if predicted[y, x] != BACKGROUND:
-                    cost += np.float32(1.5)
-                costs[1, y, x] = min(cost, CAP)
-            colour = bins[y, x]
-            for k in range(n):
+                continue
+            cost, sigma, shade = _deviation(
+                (now[0, x], now[1, x], now[2, x]),
+                (behind[y, x, 0], behind[y, x, 1], behind[y, x, 2]),
+                np.float32(1.05),
+                noise,
+                behind_sigma[y, x],
+            )
+            cost = p[7] + _with_shade(cost, sigma, shade, p[3], p[5])
+            if predicted[y, x] != BACKGROUND:
+                cost += np.float32(1.5)
+            row[x] = min(cost, CAP)
+        for k in range(n):
+            row, table, slot = costs[2 + k, y], tables[moving[k]], moving[k]
+            # Far from where it is expected, near there, and there.
+            place_costs[0], place_costs[1], place_costs[2] = far[k], 2, 0 if extra[k] else -1
+            for x in range(width):
                 place = (near[y, x] >> np.uint32(2 * k)) & np.uint32(3)
-                if place == 0 and far[k] >= CAP:
-                    costs[2 + k, y, x] = CAP
+                row[x] = CAP
+                if place == 0 and place_costs[0] >= CAP:
                     continue
-                cost = tables[moving[k], colour] + extra[k]
-                if place == 0:
-                    cost += far[k]
-                elif place == 1:
-                    cost += np.float32(2.0)
-                elif extra[k] == 0:
-                    cost -= np.float32(1.0)
-                if rest[y, x] == moving[k]:  # nothing if it is on the way
+                cost = table[bins[y, x]] + extra[k] + place_costs[place]
+                if rest[y, x] == slot:  # nothing if it is on the way
                     cost += extra[k]
-                costs[2 + k, y, x] = min(cost, CAP)
-            costs[2 + n, y, x] = p[1]
+                row[x] = min(cost, CAP)
+        costs[2 + n, y] = p[1]
 
 
 @nb.njit(cache=True, nogil=True)
 def cheapest(costs: Floats, rest: Slots, moving: NDArray[np.uint8], slots: Slots, sure: NDArray[np.uint8]) -> None:
     """Cheapest candidate of every pixel, and whether it is cheaper by more than 1 than any other segment."""
     n_costs, height, width = costs.shape
+    second, at = np.empty(width, np.float32), np.empty(width, np.uint8)
+    best = np.empty(width, np.float32)
     for y in range(height):
+        best[:], second[:], at[:] = costs[0, y], np.float32(1e9), 0
+        for k in range(1, n_costs):
+            row = costs[k, y]
+            for x in range(width):
+                cost = row[x]
+                is_best = cost < best[x]
+                second[x] = best[x] if is_best else min(cost, second[x])
+                at[x] = k if is_best else at[x]
+                best[x] = cost if is_best else best[x]
         for x in range(width):
-            best, second, at = costs[0, y, x], np.float32(1e9), 0
-            for k in range(1, n_costs):
-                cost = costs[k, y, x]
-                if cost < best:
-                    second, best, at = best, cost, k
-                elif cost < second:
-                    second = cost
-            slots[y, x] = _slot(at, rest[y, x], moving)
-            sure[y, x] = second - best > np.float32(1)
+            slots[y, x] = _slot(at[x], rest[y, x], moving)
+            sure[y, x] = second[x] - best[x] > np.float32(1)
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -260,7 +301,7 @@ def _cost_of(slot: int, costs: Floats, rest: int, moving: NDArray[np.uint8], y: 
     return cost
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def relax(
     costs: Floats,
     image: Lab,
@@ -279,25 +320,24 @@ def relax(
     height, width = slots.shape
     weights = np.empty(8, np.float32)
     around = np.empty(8, np.uint8)
+    mixed = np.ones(width, np.uint8)
     for y in range(height):
+        relaxed[y] = slots[y]
+        if not awake[y].any():
+            continue
+        if 0 < y < height - 1:  # all of a row at once, in vector instructions
+            above, row, below = slots[y - 1], slots[y], slots[y + 1]
+            for x in range(1, width - 1):
+                own = row[x]
+                beside = (row[x - 1] ^ own) | (row[x + 1] ^ own)
+                over = (above[x - 1] ^ own) | (above[x] ^ own) | (above[x + 1] ^ own)
+                mixed[x] = beside | over | (below[x - 1] ^ own) | (below[x] ^ own) | (below[x + 1] ^ own)
+        else:
+            mixed[:] = 1
         for x in range(width):
+            if not awake[y, x] or not mixed[x]:
+                continue
             own = slots[y, x]
-            relaxed[y, x] = own
-            if not awake[y, x]:
-                continue
-            if (
-                0 < y < height - 1
-                and 0 < x < width - 1
-                and slots[y, x - 1] == own
-                and slots[y, x + 1] == own
-                and slots[y - 1, x] == own
-                and slots[y + 1, x] == own
-                and slots[y - 1, x - 1] == own
-                and slots[y - 1, x + 1] == own
-                and slots[y + 1, x - 1] == own
-                and slots[y + 1, x + 1] == own
-            ):
-                continue
             n, alike = 0, True
             for dy in range(-1, 2):
                 for dx in range(-1, 2):
@@ -341,6 +381,11 @@ def relax(
                     relaxed[y, x] = candidate
     awake[:] = False
     for y in range(height):
+        changed = False
+        for x in range(width):
+            changed |= relaxed[y, x] != slots[y, x]
+        if not changed:
+            continue
         for x in range(width):
             if relaxed[y, x] != slots[y, x]:
                 awake[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2] = True

@@ -79,25 +79,31 @@ def describe(
     slot, area = np.zeros(n, np.int64), np.zeros(n, np.int64)
     box = np.zeros((n, 4), np.int64)
     box[:, :2] = max(height, width)
-    unknown, resting, inner = np.zeros(n, np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
+    unknown, resting, inner = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
     for y in range(height):
-        for x in range(width):
-            k = parts[y, x]
-            slot[k] = slots[y, x]
-            area[k] += 1
+        above, row, below = parts[max(y - 2, 0)], parts[y], parts[min(y + 2, height - 1)]
+        begin = 0
+        while begin < width:
+            k, end = row[begin], begin + 1
+            while end < width and row[end] == k:
+                end += 1
+            slot[k] = slots[y, begin]
+            area[k] += end - begin
             box[k, 0] = min(box[k, 0], y)
-            box[k, 1] = min(box[k, 1], x)
+            box[k, 1] = min(box[k, 1], begin)
             box[k, 2] = max(box[k, 2], y)
-            box[k, 3] = max(box[k, 3], x)
-            unknown[k] += unknown_for[y, x]
-            resting[k] += resting_for[y, x]
-            if (
-                parts[max(y - 2, 0), x] == k
-                and parts[min(y + 2, height - 1), x] == k
-                and parts[y, max(x - 2, 0)] == k
-                and parts[y, min(x + 2, width - 1)] == k
-            ):
-                inner[k] += 1
+            box[k, 3] = max(box[k, 3], end - 1)
+            n_unknown, n_resting, n_inner = 0, 0, 0
+            for x in range(begin, end):
+                n_unknown += unknown_for[y, x]
+                n_resting += resting_for[y, x]
+                n_inner += (
+                    (above[x] == k) & (below[x] == k) & (row[max(x - 2, 0)] == k) & (row[min(x + 2, width - 1)] == k)
+                )
+            unknown[k] += n_unknown
+            resting[k] += n_resting
+            inner[k] += n_inner
+            begin = end
     return slot, area, box, unknown / area, resting / area, inner / area
 
 
@@ -218,7 +224,7 @@ def share_out(slots: Slots, taught: NDArray[np.uint8], bins: NDArray[np.uint16],
         left = still
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def settle(
     image: Lab,
     before: Lab,

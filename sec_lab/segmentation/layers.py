@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sec_lab.recording.sharing import read_ahead
+from sec_lab.segmentation.appearance import smoothed_lab
 from sec_lab.segmentation.layer_parameters import DEFAULT, LayerParameters
 from sec_lab.segmentation.record import Segmentation
 from sec_lab.segmentation.scene_layers import Layers
@@ -69,9 +71,10 @@ def _layered(recording: "Recording", parameters: LayerParameters) -> Iterator[tu
         return
     layers = Layers(opening[0].image, _static_scene(opening, parameters), parameters)
     yield opening[0].index, layers.label_image
-    for frame in chain(opening[1:], frames):
-        layers.step(frame.image)
-        yield frame.index, layers.label_image
+    coming = ((frame.index, smoothed_lab(frame.image)) for frame in chain(opening[1:], frames))
+    for number, picture in read_ahead(coming):
+        layers.follow(picture)
+        yield number, layers.label_image
 
 
 def _static_scene(opening: list["Frame"], parameters: LayerParameters) -> NDArray[np.uint8]:

@@ -70,12 +70,16 @@ class Layers:
 
     def step(self, image: NDArray[np.uint8]) -> None:
         """Label the next frame, (height, width, 3) uint8 RGB."""
+        self.follow(smoothed_lab(image))
+
+    def follow(self, picture: Lab) -> None:
+        """Label the next frame, (height, width, 3) uint8 as of :func:`smoothed_lab`."""
         from sec_lab.segmentation import _layer_kernels as kernels
         from sec_lab.segmentation import _part_kernels
 
         p, segments = self._p, self._segments
         segments.n_steps += 1
-        lab = self._compensated(smoothed_lab(image))
+        lab = self._compensated(picture)
         bins = kernels.colour_bins(lab)
         predicted = self._predicted(lab)
         moving = segments.candidates()

@@ -7,7 +7,6 @@ neighbour, gets back the label of a segment that was lost, or a new one.
 
 import math
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from sec_lab.codes import as_integers
 from sec_lab.recording import Recording
+from sec_lab.recording.sharing import read_ahead
 from sec_lab.segmentation.flow import RESIDUAL_LIMIT, dense_inverse_search, grey_flow, reduced_grey
 from sec_lab.segmentation.potts import (
     LOWEST,
@@ -216,13 +216,10 @@ def tracked_frames(
     tracker = _Tracker(parameters, as_seed(seed), recording.size)
     preparation = _Preparation(recording, parameters)
     # While a frame is relaxed, the next one is read and prepared beside it: this needs no labels.
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        ahead = beside.submit(preparation.next)
-        while (prepared := ahead.result()) is not None:
-            ahead = beside.submit(preparation.next)
-            labels, events = tracker.step(prepared)
-            number = prepared.number
-            yield TrackedFrame(number, labels, tuple(SegmentEvent(number, *event) for event in events))
+    for prepared in read_ahead(iter(preparation.next, None)):
+        labels, events = tracker.step(prepared)
+        number = prepared.number
+        yield TrackedFrame(number, labels, tuple(SegmentEvent(number, *event) for event in events))
 
 
 def _numbered_labels(recording: Recording, parameters: TrackingParameters, seed: int) -> Iterator[tuple[int, Labels]]:

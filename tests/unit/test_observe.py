@@ -1,10 +1,13 @@
 """`observe`: steps 1 to 4 joined, each frame read once, nothing kept."""
 
 import gc
+import itertools
 import pickle
 import tempfile
+import threading
 import tracemalloc
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +23,7 @@ from sec_lab import pipeline
 from sec_lab.files import UnusableFileError
 from sec_lab.pipeline import LabelledFrame, observe, segmenter
 from sec_lab.recording import Calibration, Frame, Recording, write_movie
-from sec_lab.recording.sharing import shared, with_depth
+from sec_lab.recording.sharing import read_ahead, shared, with_depth
 from sec_lab.relations import SegmentRelations, scan_line_relations
 from sec_lab.segmentation import Segmentation
 from sec_lab.segmentation.colour import NamedColour, colour_segmentation
@@ -341,3 +344,49 @@ class TestSpool:
             kept = spooled(by_colour(Recording.from_frames(pushed())), file)
             next(iter(kept))
             assert len(list(kept)) == len(list(kept)) == 6
+
+
+def test_what_is_read_ahead_is_the_same_and_one_item_ahead() -> None:
+    made: list[int] = []
+
+    def items() -> Iterator[int]:
+        for k in range(5):
+            made.append(k)
+            yield k
+
+    ahead = read_ahead(items())
+    assert next(ahead) == 0
+    for k in range(1, 5):
+        assert next(ahead) == k
+        assert max(made) <= k + 1
+    assert list(ahead) == []
+
+
+def test_an_error_ahead_comes_in_its_place() -> None:
+    def items() -> Iterator[int]:
+        yield 0
+        raise ValueError("frame 1: broken")
+
+    ahead = read_ahead(items())
+    assert next(ahead) == 0
+    with pytest.raises(ValueError, match="frame 1: broken"):
+        next(ahead)
+
+
+def test_who_stops_early_leaves_no_thread_behind() -> None:
+    before = threading.active_count()
+    ahead = read_ahead(itertools.count())
+    assert next(ahead) == 0
+    assert threading.active_count() == before + 1
+    ahead.close()  # type: ignore[attr-defined]
+    assert threading.active_count() == before
+
+
+def test_two_readers_in_threads_of_their_own_get_the_same_frames() -> None:
+    movie = Recording.from_frames(np.arange(200, dtype=np.uint8).reshape(200, 1, 1, 1).repeat(3, axis=3))
+    again, beside = shared(movie)
+    with ThreadPoolExecutor(2) as pool:
+        results = [pool.submit(list, frames) for frames in (iter(again), beside)]
+    one, other = (result.result() for result in results)
+    assert [frame.index for frame in one] == [frame.index for frame in other] == list(range(200))
+    assert all(a is b for a, b in zip(one, other, strict=True))
