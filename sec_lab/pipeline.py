@@ -1,7 +1,8 @@
 """Steps 1 to 4 joined, frame by frame: from pictures to the observation of an action (Fig. 2.2)."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing
 from functools import partial
 from importlib import import_module
 from itertools import count, tee
@@ -15,7 +16,7 @@ from sec_lab.codes import as_array
 from sec_lab.event_chain import Names
 from sec_lab.observation import Observation
 from sec_lab.recording import Calibration, Frame, Recording
-from sec_lab.recording.sharing import DepthOfFrame, read_ahead, shared, with_depth
+from sec_lab.recording.sharing import DepthOfFrame, ReadAhead, shared, with_depth
 from sec_lab.relations import SegmentRelations, edge_count_relations, scan_line_relations
 from sec_lab.scene_graph import MainGraphs, main_graphs, scene_graph
 from sec_lab.segmentation import Segmentation, check_fit
@@ -28,6 +29,7 @@ SegmentationMethod = Literal["layers", "potts"] | Segmenter
 
 LabelledFrame = tuple[int, NDArray[np.uint16], NDArray[np.float32] | None]
 """Frame number, label image, and depth in metres where there is any."""
+_LabelledFrames = Generator[LabelledFrame, None, None] | ReadAhead[LabelledFrame]
 RelationsOverTime = Callable[[Iterable[LabelledFrame]], Iterable[tuple[int, SegmentRelations]]]
 
 _METHODS: dict[str, RelationFunction] = {
@@ -68,7 +70,8 @@ def observe(
         Step 1 (§2.2): :func:`~sec_lab.segmentation.layers.layered_segments` (default),
         :func:`~sec_lab.segmentation.tracking.track_segments`, any function from a recording to a
         :class:`~sec_lab.segmentation.Segmentation` (``functools.partial`` sets parameters), or what any other tracker
-        has found in the movie (:func:`~sec_lab.segmentation.masks.open_masks`).
+        has found in the movie (:func:`~sec_lab.segmentation.masks.open_masks`). A method works in a thread of its own,
+        one frame ahead of the relations.
     over_time : {"steady"}, callable or None, optional
         Step 2 (§2.3): :func:`~sec_lab.relations.over_time.steady_relations` (default), any function from a stream of
         (frame number, label image, depth in metres or None) to a stream of (frame number, relations), or None:
@@ -112,7 +115,7 @@ def observe(
     if over_time is not None and relations is not scan_line_relations:
         raise ValueError("relations: expected those of each frame by itself (over_time=None) for a method of their own")
     follow: RelationsOverTime | None = _named(over_time, _OVER_TIME, what="over_time")
-    labelled: Iterable[LabelledFrame]
+    labelled: _LabelledFrames
     if isinstance(recording, Segmentation):
         found, labelled, n_frames = recording, _without_depth(recording), recording.n_frames
     else:
@@ -120,16 +123,19 @@ def observe(
         movie = _with_stereo_depth(movie)
         found, labelled = _segmented(movie, segmentation)
         n_frames = movie.n_frames if found.n_frames is None else found.n_frames
-    if progress:
-        from tqdm import tqdm
+    # An error in one stage stops all of them, wherever they run.
+    with closing(labelled):
+        coming: Iterable[LabelledFrame] = labelled
+        if progress:
+            from tqdm import tqdm
 
-        labelled = tqdm(labelled, total=n_frames, unit="frame")
-    followed: Iterable[tuple[int, SegmentRelations]]
-    if follow is None:
-        followed = ((number, _found(relations, labels, number)) for number, labels, _ in labelled)
-    else:
-        followed = follow(labelled)
-    main = _main_graphs(followed)
+            coming = tqdm(labelled, total=n_frames, unit="frame")
+        followed: Iterable[tuple[int, SegmentRelations]]
+        if follow is None:
+            followed = ((number, _found(relations, labels, number)) for number, labels, _ in coming)
+        else:
+            followed = follow(coming)
+        main = _main_graphs(followed)
     return Observation(main.graphs, main.key_frames, found.names if names is None else names, "px", found)
 
 
@@ -220,27 +226,21 @@ def observe_segments(
 
 def _segmented(
     movie: Recording, segmentation: SegmentationMethod | Segmentation
-) -> tuple[Segmentation, Iterable[LabelledFrame]]:
+) -> tuple[Segmentation, _LabelledFrames]:
     """The segmentation of a movie, and its label images with the depth of their frames."""
-    is_known = isinstance(segmentation, Segmentation)
     if isinstance(segmentation, Segmentation):
         check_fit(segmentation, movie)
         # Pictures are not looked at, so they need not be decoded where they bring no depth.
         frames = iter(movie) if movie.has_depth else None
-    else:
-        segment = segmenter(segmentation)
-        movie, frames = shared(movie) if movie.has_depth else (movie, None)
-        segmentation = segment(movie)
-        if not isinstance(segmentation, Segmentation):
-            raise ValueError(
-                f"segmentation: expected a Segmentation from the function, got {type(segmentation).__name__}"
-            )
-    labelled = (
-        _without_depth(segmentation)
-        if frames is None
-        else _with_depth_of(frames, segmentation, n_frames=movie.n_frames)
-    )
-    return segmentation, labelled if is_known else read_ahead(labelled)
+        return segmentation, _with_depth_of(frames, segmentation, n_frames=movie.n_frames)
+    segment = segmenter(segmentation)
+    movie, frames = shared(movie) if movie.has_depth else (movie, None)
+    found = segment(movie)
+    if not isinstance(found, Segmentation):
+        raise ValueError(f"segmentation: expected a Segmentation from the function, got {type(found).__name__}")
+    labelled = _with_depth_of(frames, found, n_frames=movie.n_frames)
+    # While the relations of a frame are found, the next one is segmented; its labels may be in the same memory.
+    return found, ReadAhead((number, np.array(labels), depth) for number, labels, depth in labelled)
 
 
 def _with_stereo_depth(movie: Recording) -> Recording:
@@ -261,13 +261,16 @@ def _depth_from_stereo(camera: Calibration) -> DepthOfFrame:
     return depth_of
 
 
-def _without_depth(segmentation: Segmentation) -> Iterator[LabelledFrame]:
+def _without_depth(segmentation: Segmentation) -> Generator[LabelledFrame, None, None]:
     return ((number, labels, None) for number, labels in segmentation.numbered())
 
 
 def _with_depth_of(
-    frames: Iterator[Frame], segmentation: Segmentation, *, n_frames: int | None
-) -> Iterator[LabelledFrame]:
+    frames: Iterator[Frame] | None, segmentation: Segmentation, *, n_frames: int | None
+) -> Generator[LabelledFrame, None, None]:
+    if frames is None:
+        yield from _without_depth(segmentation)
+        return
     frame: Frame | None = None
     for number, labels in segmentation.numbered():
         while frame is None or frame.index < number:

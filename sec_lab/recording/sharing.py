@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar, cast
@@ -21,22 +21,61 @@ _Item = TypeVar("_Item")
 _END = object()
 
 
-def read_ahead(items: Iterator[_Item]) -> Iterator[_Item]:
-    """The same items, each of which is made by a thread beside while the one before it is in use.
+class ReadAhead(Iterator[_Item]):
+    """The same items in the same order, each of which a thread beside makes while the one before it is in use.
 
-    An error is raised where its item would have come. Nothing changes but the time: the items are made one after the
-    other, in their order.
+    So an item must not change when the next one is made, and one more is made than was asked for. Whoever stops early
+    should close the reading: then nothing goes on behind his back.
+
+    Parameters
+    ----------
+    items : iterator
+        Used by the thread beside from the first item on, and by nobody else.
+
+    Raises
+    ------
+    Exception
+        Of any kind, what ``items`` raises, in the place of its item; the reading is over then.
 
     Examples
     --------
-    >>> list(read_ahead(iter("abc")))
+    >>> list(ReadAhead(iter("abc")))
     ['a', 'b', 'c']
     """
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        coming = beside.submit(next, items, _END)
-        while (item := coming.result()) is not _END:
-            coming = beside.submit(next, items, _END)
-            yield cast("_Item", item)
+
+    def __init__(self, items: Iterator[_Item]) -> None:
+        self._items = items
+        # Without a `with`: left to the garbage collector, which may run in this very thread, nobody waits for it.
+        self._beside = ThreadPoolExecutor(max_workers=1)
+        self._coming: Future[_Item | object] | None = None
+        self._is_over = False
+
+    def __next__(self) -> _Item:
+        if self._is_over:
+            raise StopIteration
+        coming = self._coming or self._beside.submit(next, self._items, _END)
+        self._coming = None
+        try:
+            item = coming.result()
+        except BaseException:
+            self.close()
+            raise
+        finally:
+            del coming  # an error would keep itself, and all that it has seen, alive through it
+        if item is _END:
+            self.close()
+            raise StopIteration
+        self._coming = self._beside.submit(next, self._items, _END)
+        return cast("_Item", item)
+
+    def close(self) -> None:
+        """Stop; an item that is being made is waited for and dropped, and so are the items if they can be closed."""
+        self._is_over = True
+        self._coming = None
+        self._beside.shutdown(wait=True, cancel_futures=True)
+        close = getattr(self._items, "close", None)
+        if close is not None:
+            close()
 
 
 def with_depth(recording: "Recording", start: Callable[[], DepthOfFrame]) -> "Recording":
@@ -97,17 +136,18 @@ class _Reading:
     def __init__(self, recording: "Recording") -> None:
         self._recording = recording
         self._source = recording.read()
-        # The two may read in threads of their own, see read_ahead.
+        # The two may read in threads of their own, see ReadAhead.
         self._one_by_one = threading.Lock()
         self._is_taken = self._has_left = False
         self._ahead: deque[Frame] = deque()
         self._behind: deque[Frame] = deque()
 
     def __call__(self) -> Iterator[Frame]:
-        if self._is_taken:
-            return self._recording.read()
-        self._is_taken = True
-        return self._leading()
+        with self._one_by_one:
+            if not self._is_taken:
+                self._is_taken = True
+                return self._leading()
+        return self._recording.read()
 
     def _leading(self) -> Iterator[Frame]:
         try:

@@ -48,8 +48,8 @@ def colour_bins(image: Lab) -> NDArray[np.uint16]:
         scales[lightness] = _MIDDLE / (lightness + 16.0) / _CHROMA_STEP
     for y in range(height):
         for x in range(width):
-            colour = np.int64(image[y, x, 0]), np.int64(image[y, x, 1]), np.int64(image[y, x, 2])
-            found[y, x] = _bin(colour[0], colour[1], colour[2], scales)
+            light, a, b = np.int64(image[y, x, 0]), np.int64(image[y, x, 1]), np.int64(image[y, x, 2])
+            found[y, x] = _bin(light, a, b, scales)
     return found
 
 
@@ -146,20 +146,22 @@ def _deviation(
     now: tuple[Float, Float, Float],
     before: tuple[Float, Float, Float],
     brightest: Float,
-    p: tuple[Float, Float, Float, Float],
+    noise: tuple[Float, Float, Float, Float],
     extra: Float,
 ) -> tuple[Float, Float, Float]:
     """Cost of a colour where another one was seen before, in the likeliest light; and the noise and shade of that."""
+    static_cost, lightness_sigma, chroma_sigma, shadow_sigma = noise
     light0, a0, b0 = before[0] + np.float32(16), before[1] - np.float32(128), before[2] - np.float32(128)
     light1, a1, b1 = now[0] + np.float32(16), now[1] - np.float32(128), now[2] - np.float32(128)
     shade = (light1 * light0 + a1 * a0 + b1 * b0) / (light0 * light0 + a0 * a0 + b0 * b0)
     shade = min(max(shade, np.float32(0.62)), brightest)
     off = np.float32(1) - shade
     off = np.float32(-0.5) * off if off < 0 else off
-    sigma_light = p[1] + extra + p[3] * off
-    sigma = p[2] + np.float32(0.5) * extra + p[3] * off
+    sigma_light = lightness_sigma + extra + shadow_sigma * off
+    sigma = chroma_sigma + np.float32(0.5) * extra + shadow_sigma * off
     d0, d1, d2 = light1 - shade * light0, a1 - shade * a0, b1 - shade * b0
-    cost = p[0] + np.float32(0.5) * (d0 * d0 / (sigma_light * sigma_light) + (d1 * d1 + d2 * d2) / (sigma * sigma))
+    squares = d0 * d0 / (sigma_light * sigma_light) + (d1 * d1 + d2 * d2) / (sigma * sigma)
+    cost = static_cost + np.float32(0.5) * squares
     return cost, sigma, shade
 
 
@@ -203,7 +205,7 @@ def label_costs(
     noise = (p[0], p[2], p[3], p[4])
     now, before = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
     sigmas, shades = np.empty(width, np.float32), np.empty(width, np.float32)
-    place_costs = np.empty(3, np.float32)
+    place_costs = np.zeros(4, np.float32)
     for y in range(height):
         for x in range(width):
             for c in range(3):

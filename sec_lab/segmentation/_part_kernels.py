@@ -183,9 +183,18 @@ def recolour(parts: NDArray[np.int32], new: NDArray[np.int64], slots: Slots, tau
 
 @nb.njit(cache=True, nogil=True)
 def share_out(slots: Slots, taught: NDArray[np.uint8], bins: NDArray[np.uint16], tables: Floats) -> None:
-    """Give every unknown pixel to the segment nearest to it: the one that surrounds it most, or is more like it.
+    """Share out what is unknown, ring after ring from its rim inwards; what is given so is not taught.
 
-    From the rim inwards, a pixel at a time; what is given so is not taught. A picture of nothing else is background.
+    A pixel goes to the slot that most of its 8 neighbours have; of several, to that under which its colour costs least;
+    then to the first of them. A picture of nothing else becomes background. Meant for thin parts: every ring passes
+    over all that is left.
+
+    Parameters
+    ----------
+    slots, taught : (height, width) uint8
+        Changed in place.
+    bins : (height, width) uint16
+    tables : (256, N_BINS) float32
     """
     height, width = slots.shape
     rows, columns = np.nonzero(slots == UNKNOWN)

@@ -82,6 +82,7 @@ class LayerParameters:
         mostly highlights and rims.
     inner_share : float, optional
         Share of pixels more than two away from the border that a new segment must have: rims are thin, things are not.
+        A thinner part that nothing explains is shared out among what is around it.
     close_share : float, optional
         Distance up to which a segment is near by, as a share of the longer side: 26 pixels of 320×256, a hand's step in
         two or three frames.

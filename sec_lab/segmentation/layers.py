@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sec_lab.recording.sharing import read_ahead
+from sec_lab.recording.sharing import ReadAhead
 from sec_lab.segmentation.appearance import smoothed_lab
 from sec_lab.segmentation.layer_parameters import DEFAULT, LayerParameters
 from sec_lab.segmentation.record import Segmentation
@@ -72,8 +72,8 @@ def _layered(recording: "Recording", parameters: LayerParameters) -> Iterator[tu
     layers = Layers(opening[0].image, _static_scene(opening, parameters), parameters)
     yield opening[0].index, layers.label_image
     coming = ((frame.index, smoothed_lab(frame.image)) for frame in chain(opening[1:], frames))
-    for number, picture in read_ahead(coming):
-        layers.follow(picture)
+    for number, picture in ReadAhead(coming):
+        layers.step(picture)
         yield number, layers.label_image
 
 

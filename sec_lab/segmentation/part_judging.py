@@ -10,7 +10,7 @@ from sec_lab.segmentation.known_segments import CLEARLY, N_SLOTS, SURELY, KnownS
 from sec_lab.segmentation.layer_parameters import LayerParameters
 
 UNTAUGHT = 256
-"""Added to a slot: a part belongs to it, but its colours are not learned; to 0: its pixels are shared out."""
+"""Added to a slot: a part belongs to it, but its colours are not learned. By itself: its pixels are shared out."""
 
 _PAUSE_FRAMES = 3
 """A mover that rests for so long makes a pause; its parts that rest are not left behind."""
@@ -306,7 +306,10 @@ class Judge:
         return int(np.argmax(np.where(moved, part.around, 0)))
 
     def absorbing(self, part: Part) -> int:
-        """Slot that a part falls to which is too small, or not to be explained yet; 0 for a rim, of all around it."""
+        """Slot that a part falls to which is too small, or not to be explained yet.
+
+        0 if it is unknown and thin: then its pixels are shared out (:func:`_part_kernels.share_out`).
+        """
         if part.slot == 0 and not part.thick:
             return 0
         weight = part.around + 0.3 * part.guess + 0.5 * part.below

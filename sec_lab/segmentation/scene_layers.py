@@ -68,11 +68,7 @@ class Layers:
         """Label of every pixel of the last frame, (height, width) uint16."""
         return self._segments.labels[self.slots]
 
-    def step(self, image: NDArray[np.uint8]) -> None:
-        """Label the next frame, (height, width, 3) uint8 RGB."""
-        self.follow(smoothed_lab(image))
-
-    def follow(self, picture: Lab) -> None:
+    def step(self, picture: Lab) -> None:
         """Label the next frame, (height, width, 3) uint8 as of :func:`smoothed_lab`."""
         from sec_lab.segmentation import _layer_kernels as kernels
         from sec_lab.segmentation import _part_kernels

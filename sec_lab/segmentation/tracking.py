@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sec_lab.codes import as_integers
 from sec_lab.recording import Recording
-from sec_lab.recording.sharing import read_ahead
+from sec_lab.recording.sharing import ReadAhead
 from sec_lab.segmentation.flow import RESIDUAL_LIMIT, dense_inverse_search, grey_flow, reduced_grey
 from sec_lab.segmentation.potts import (
     LOWEST,
@@ -216,7 +216,7 @@ def tracked_frames(
     tracker = _Tracker(parameters, as_seed(seed), recording.size)
     preparation = _Preparation(recording, parameters)
     # While a frame is relaxed, the next one is read and prepared beside it: this needs no labels.
-    for prepared in read_ahead(iter(preparation.next, None)):
+    for prepared in ReadAhead(iter(preparation.next, None)):
         labels, events = tracker.step(prepared)
         number = prepared.number
         yield TrackedFrame(number, labels, tuple(SegmentEvent(number, *event) for event in events))

@@ -5,9 +5,12 @@ import itertools
 import pickle
 import tempfile
 import threading
+import time
 import tracemalloc
+import weakref
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,7 +26,7 @@ from sec_lab import pipeline
 from sec_lab.files import UnusableFileError
 from sec_lab.pipeline import LabelledFrame, observe, segmenter
 from sec_lab.recording import Calibration, Frame, Recording, write_movie
-from sec_lab.recording.sharing import read_ahead, shared, with_depth
+from sec_lab.recording.sharing import ReadAhead, shared, with_depth
 from sec_lab.relations import SegmentRelations, scan_line_relations
 from sec_lab.segmentation import Segmentation
 from sec_lab.segmentation.colour import NamedColour, colour_segmentation
@@ -348,45 +351,114 @@ class TestSpool:
 
 def test_what_is_read_ahead_is_the_same_and_one_item_ahead() -> None:
     made: list[int] = []
+    is_ahead = threading.Event()
 
     def items() -> Iterator[int]:
         for k in range(5):
             made.append(k)
+            if k == 1:
+                is_ahead.set()
             yield k
 
-    ahead = read_ahead(items())
-    assert next(ahead) == 0
+    reading = ReadAhead(items())
+    assert made == []
+    assert next(reading) == 0
+    assert is_ahead.wait(10)  # while the first item is in use
     for k in range(1, 5):
-        assert next(ahead) == k
+        assert next(reading) == k
         assert max(made) <= k + 1
-    assert list(ahead) == []
+    assert list(reading) == []
 
 
-def test_an_error_ahead_comes_in_its_place() -> None:
+def test_an_error_ahead_comes_in_its_place_and_keeps_nothing_alive() -> None:
+    class Large:
+        pass
+
     def items() -> Iterator[int]:
+        large = Large()
+        alive.append(weakref.ref(large))
         yield 0
         raise ValueError("frame 1: broken")
 
-    ahead = read_ahead(items())
-    assert next(ahead) == 0
-    with pytest.raises(ValueError, match="frame 1: broken"):
-        next(ahead)
+    alive: list[weakref.ref[Large]] = []
+    reading = ReadAhead(items())
+    assert next(reading) == 0
+    gc.disable()
+    try:
+        with pytest.raises(ValueError, match="frame 1: broken") as raised:
+            next(reading)
+        del raised
+        assert alive[0]() is None
+    finally:
+        gc.enable()
+    assert list(reading) == []
 
 
-def test_who_stops_early_leaves_no_thread_behind() -> None:
+def test_who_closes_a_reading_leaves_no_thread_behind() -> None:
     before = threading.active_count()
-    ahead = read_ahead(itertools.count())
-    assert next(ahead) == 0
-    assert threading.active_count() == before + 1
-    ahead.close()  # type: ignore[attr-defined]
+    inner = ReadAhead(itertools.count())
+    outer = ReadAhead(iter(inner))
+    assert next(outer) == 0
+    assert threading.active_count() == before + 2
+    outer.close()
+    inner.close()
+    assert threading.active_count() == before
+    assert list(outer) == list(inner) == []
+
+
+def test_a_reading_that_is_dropped_ends_by_itself() -> None:
+    before = set(threading.enumerate())
+    reading = ReadAhead(itertools.count())
+    assert next(reading) == 0
+    (worker,) = set(threading.enumerate()) - before
+    del reading
+    worker.join(10)
+    assert not worker.is_alive()
+
+
+def test_an_error_in_the_relations_stops_the_segmentation() -> None:
+    def broken(labelled: Iterable[LabelledFrame]) -> Iterator[tuple[int, SegmentRelations]]:
+        for number, labels, _ in labelled:
+            if number == 2:
+                raise RuntimeError("no relations today")
+            yield number, scan_line_relations(labels)
+
+    before = threading.active_count()
+    with pytest.raises(RuntimeError, match="no relations today") as raised:
+        observe(Recording.from_frames(pushed()), over_time=broken, segmentation=by_colour)
+    assert raised.tb is not None  # what it has seen is still there, but nobody works on
     assert threading.active_count() == before
 
 
+def test_a_method_may_use_the_memory_of_its_labels_again() -> None:
+    frames = pushed()
+    given = [np.asarray(image) for image in by_colour(Recording.from_frames(frames))]
+
+    def reusing(recording: Recording) -> Segmentation:
+        def read() -> Iterator[tuple[int, NDArray[np.uint16]]]:
+            buffer = np.empty(recording.size, np.uint16)
+            for number, labels in enumerate(given):
+                buffer[:] = labels
+                yield number, buffer
+
+        return Segmentation(read, recording.size, background=0)
+
+    expected = observe(Recording.from_frames(frames), over_time=None, segmentation=by_colour)
+    for _ in range(5):
+        seen = observe(Recording.from_frames(frames), over_time=None, segmentation=reusing)
+        np.testing.assert_array_equal(seen.chain.relations, expected.chain.relations)
+
+
 def test_two_readers_in_threads_of_their_own_get_the_same_frames() -> None:
-    movie = Recording.from_frames(np.arange(200, dtype=np.uint8).reshape(200, 1, 1, 1).repeat(3, axis=3))
+    def slow() -> Iterator[Frame]:
+        for number in range(50):
+            time.sleep(0.001)  # lets the other thread go on in the middle of a frame
+            yield Frame(number, np.zeros((1, 1, 3), np.uint8))
+
+    movie = replace(Recording.from_frames(np.zeros((50, 1, 1, 3), np.uint8)), read=slow)
     again, beside = shared(movie)
     with ThreadPoolExecutor(2) as pool:
         results = [pool.submit(list, frames) for frames in (iter(again), beside)]
     one, other = (result.result() for result in results)
-    assert [frame.index for frame in one] == [frame.index for frame in other] == list(range(200))
+    assert [frame.index for frame in one] == [frame.index for frame in other] == list(range(50))
     assert all(a is b for a, b in zip(one, other, strict=True))

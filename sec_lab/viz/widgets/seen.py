@@ -312,6 +312,7 @@ class _Keeper:
         self.frames: list[KeptFrame] = []
         self._tell = tell
         self._n_frames: int | None = None
+        # Filled in one thread while another one takes from it.
         self._ahead: dict[int, Frame] = {}
 
     def segment(self, method: Callable[[Recording], Segmentation], movie: Recording) -> Segmentation:
@@ -332,7 +333,7 @@ class _Keeper:
     def _label(self, found: Segmentation) -> Iterator[tuple[int, Labels]]:
         self.frames.clear()
         for number, labels in found.numbered():
-            for index in sorted(index for index in self._ahead if index < number):
+            for index in sorted(index for index in list(self._ahead) if index < number):
                 self._keep(_joined(index, self._ahead.pop(index), None))
             self._keep(_joined(number, self._ahead.pop(number, None), labels))
             yield number, labels
