@@ -206,7 +206,8 @@ def test_long_movies_need_no_more_memory() -> None:
         return most
 
     peak(3)
-    assert peak(48) < peak(8) + 300_000
+    # Which stage is ahead of which is chance: one frame of 0.9 MB more may be alive.
+    assert peak(48) < peak(8) + 1_500_000
 
 
 class TestShared:
