@@ -14,31 +14,31 @@ RISES = 3.0
 _SURROUNDED = 0.8
 _NARROW = 3
 _SOLID = 0.8
-_OTHER_HUE, _SAME_HUE = 25.0, 5.0
+_OTHER_HUE, _A_SHADE, _SAME_HUE = 20.0, 10.0, 5.0
+"""Distances of chroma in one light, 0 to 255: of pages and a cover; more than the shade in a cup makes; of one cloth."""
 _BRIGHTER = 10.0
 _AT_BORDER = 0.15
 _NEAR_BORDER = 0.15
+_THICK, _VERY_THICK = 0.6, 0.75
+"""More than a rim, and more than a band: a rectangle of 2 to 1 has 0.63."""
+
 _A_SIDE = 0.1
 
 
 def tidied(labels: Labels, least_px: int) -> Labels:
-    """Each object one region without holes; what is too small belongs to the background."""
+    """Each connected region without holes an object of its own; what is too small belongs to the background."""
     import cv2
 
     tidied = np.full_like(labels, BACKGROUND)
     number = BACKGROUND
     for slot in np.unique(labels[labels > BACKGROUND]):
         n, parts, statistics, _ = cv2.connectedComponentsWithStats((labels == slot).astype(np.uint8), connectivity=8)
-        if n < 2:
-            continue
-        largest = 1 + int(np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
-        if statistics[largest, cv2.CC_STAT_AREA] < least_px:
-            continue
-        outlines, _ = cv2.findContours((parts == largest).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        filled = np.zeros_like(labels)
-        cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)
-        number += 1
-        tidied[(filled > 0) & ((labels == slot) | (labels == BACKGROUND))] = number
+        for part in range(1, n):
+            if statistics[part, cv2.CC_STAT_AREA] < least_px or number >= MAX_OBJECTS:
+                continue
+            filled = _filled(parts == part)
+            number += 1
+            tidied[filled & ((labels == slot) | (labels == BACKGROUND))] = number
     return tidied
 
 
@@ -138,6 +138,9 @@ def with_things_on_top(
                 continue
             if rest.sum() < least_px or not _is_surrounded(piece, region) or not _differ(bins, piece, rest, by=1.0):
                 continue
+            # A band or a cap rises, too, where it is nearer to the camera than most of its thing.
+            if _near_border(piece, labels) or _thickness(piece) <= _THICK:
+                continue
             number += 1
             parted[piece] = number
     return parted
@@ -185,8 +188,9 @@ def with_coloured_parts(
 ) -> Labels:
     """Regions with a part of another colour in two: what a cup holds, the pages of a closed book.
 
-    What is large and thick is a part. What is small is one if it lies within its region and is of another hue, which
-    no shade makes: lower than what is around it, or a strip. Rims, bands, caps and painted marks stay.
+    What is large and thick is a part; amid its region, its colours may be less unlike. What is small is one if it is of
+    another hue, which no shade makes, and lies amid its region, lower than what is around it, or is a strip near its
+    border. Rims, bands, caps and painted marks stay.
     """
     import cv2
 
@@ -208,15 +212,17 @@ def with_coloured_parts(
             piece = pieces == 1 + int(np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
             if not least <= piece.sum() <= 0.6 * area:
                 continue
-            large = piece.sum() >= 0.12 * area and _is_thick(piece) and _differ(bins, piece, rest)
-            if not large:
-                if _hue_distance(lab, piece, rest) < _OTHER_HUE or not _differ(bins, piece, rest, by=1.5):
+            within = not _near_border(piece, labels)
+            hue = _hue_distance(lab, piece, rest)
+            large = piece.sum() >= 0.12 * area and _thickness(piece) > (_THICK if within else _VERY_THICK)
+            if not (large and _differ(bins, piece, rest, by=1.5 if within and hue > _A_SHADE else 3.0)):
+                if hue < _OTHER_HUE or not _differ(bins, piece, rest, by=1.5):
                     continue
                 if _is_ground(lab, piece, labels):
                     parted[piece] = BACKGROUND
                     continue
-                lower = rise is not None and _is_lower(rise, piece, region)
-                strip = _is_strip(piece) and not _is_band(piece, region) and _near_border(piece, labels)
+                lower = within and rise is not None and _is_lower(rise, piece, region)
+                strip = not within and _is_strip(piece) and not _is_band(piece, region)
                 if not _is_solid(piece) or _at_border(piece, labels) or not (lower or strip):
                     continue
             number += 1
@@ -230,11 +236,6 @@ def _thickness(part: NDArray[np.bool_]) -> float:
 
     thickness = float(cv2.distanceTransform(np.pad(part, 1).astype(np.uint8), cv2.DIST_L2, 5).max())
     return thickness / float(np.sqrt(part.sum() / np.pi))
-
-
-def _is_thick(part: NDArray[np.bool_]) -> bool:
-    """Whether a part is more than a rim or a band."""
-    return _thickness(part) > 0.6
 
 
 def _is_strip(part: NDArray[np.bool_]) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sec_lab.segmentation.static_parts import tidied
 from sec_lab.segmentation.static_scene import rise_above_plane, static_segments
 from tests.drawn_scenes import BLUE, GREEN, HEIGHT, RED, TABLE, WIDTH, Block, Moment, drawn, plane
 
@@ -97,6 +98,14 @@ class TestStaticSegments:
         found = self.segments([Block((50, 34), RED, 24, 24), Block((50, 76), RED, 24, 24), Block((50, 55), RED, 8, 24)])
         assert set(np.unique(found)) == {1, 2}
 
+    def test_two_things_grown_from_one_place_are_two(self) -> None:
+        """Each connected region is a thing: none is lost, however small it is beside the other."""
+        labels = np.ones((HEIGHT, WIDTH), np.uint8)
+        labels[10:50, 10:50] = labels[10:30, 60:80] = labels[70:74, 60:64] = 2
+        found = tidied(labels, 40)
+        assert sorted(np.bincount(found.ravel())[1:].tolist()) == [400, 1600, HEIGHT * WIDTH - 2000]
+        assert found[72, 62] == 1
+
     def test_a_hole_is_filled(self) -> None:
         found = self.segments([Block((50, 60), RED, 40, 40), Block((50, 60), TABLE, 10, 10)])
         assert found[50, 60] == found[35, 45] == 2
@@ -107,9 +116,16 @@ class TestThingsOnThings:
 
     plate = Block((48, 60), (225, 225, 220), 46, 58)
 
-    def segments(self, colour: tuple[int, int, int], height: float, *, place: tuple[int, int] = (48, 60)) -> Any:
+    def segments(
+        self,
+        colour: tuple[int, int, int],
+        height: float,
+        *,
+        place: tuple[int, int] = (48, 60),
+        size: tuple[int, int] = (14, 14),
+    ) -> Any:
         """``height``: how far the small thing stands out of the plate, in units of the noise of depth."""
-        small = Block(place, colour, 14, 14)
+        small = Block(place, colour, *size)
         rng = np.random.default_rng(3)
         picture, truth = drawn(Moment([self.plate, small]), rng.normal(0, 2, (HEIGHT, WIDTH, 3)))
         inverse = 1 / plane() + rng.normal(0, 0.01, (HEIGHT, WIDTH))
@@ -130,6 +146,11 @@ class TestThingsOnThings:
 
     def test_a_bulge_of_the_same_colour_stays_with_the_plate(self) -> None:
         found, _ = self.segments(self.plate.colour, 9)
+        assert set(np.unique(found)) == {1, 2}
+
+    def test_a_band_that_rises_stays_with_the_plate(self) -> None:
+        """What is nearer to the camera than most of its thing rises, too; a thing on top is as long as it is wide."""
+        found, _ = self.segments(RED, 9, size=(6, 34))
         assert set(np.unique(found)) == {1, 2}
 
     def test_the_cap_of_a_bottle_stays_with_it(self) -> None:
@@ -173,6 +194,10 @@ class TestPartsOfAnotherHue:
     ) -> None:
         found, _ = self.segments(Block((48, 60), self.WHITE, 16, 18), lower=lower)
         assert set(np.unique(found)) == parts
+
+    def test_what_is_lower_near_the_border_is_the_band_of_a_bottle(self) -> None:
+        found, _ = self.segments(Block((63, 60), self.WHITE, 16, 18), lower=6)
+        assert set(np.unique(found)) == {1, 2}
 
     @pytest.mark.parametrize("shade", [0.8, 0.6, 0.4])
     def test_a_shade_of_the_same_hue_is_no_part(self, shade: float) -> None:
