@@ -3,12 +3,20 @@
 from collections import Counter
 from collections.abc import Iterator
 
+import numpy as np
+
 Image = list[list[int]]
 Pixel = tuple[int, int]
 
 
 def naive_steps(
-    labels: Image, depth_m: list[list[float]], *, step_m: float, skip: int, reach: int = 3
+    labels: Image,
+    depth_m: list[list[float]],
+    *,
+    step_m: float,
+    skip: int,
+    reach: int = 3,
+    planes: dict[int, tuple[float, float, float, float]] | None = None,
 ) -> tuple[Counter[Pixel], Counter[Pixel], Counter[Pixel]]:
     """Known, small and in-front counts by pair of labels."""
     known: Counter[Pixel] = Counter()
@@ -23,12 +31,35 @@ def naive_steps(
         after = _side(labels, depth_m, second, (-away[0], -away[1]), skip, reach)
         if before is None or after is None:
             continue
+        if planes is not None and abs(before - after) <= step_m:
+            at = second[1] / len(labels[0]), second[0] / len(labels)
+            one, other = (a * at[0] + b * at[1] + c for a, b, c, _ in (planes[i], planes[j]))
+            if 0 < one < other and 1 / before - one > planes[i][3]:
+                before = 1 / one
+            if 0 < other < one and 1 / after - other > planes[j][3]:
+                after = 1 / other
         for pair in ((i, j), (j, i)):
             known[pair] += 1
             small[pair] += abs(before - after) <= step_m
         if abs(before - after) > step_m:
             in_front[(i, j) if before < after else (j, i)] += 1
     return known, small, in_front
+
+
+def naive_plane(points: list[tuple[float, float, float]], spreads: float) -> tuple[float, float, float, float]:
+    """Plane a x + b y + c through points (x, y, inverse depth), by those within two spreads, and what is too near."""
+    kept = np.array(points)
+    plane, spread = np.zeros(3), np.inf
+    for _ in range(5):
+        if len(kept) < 30:
+            return 0.0, 0.0, 0.0, np.inf
+        design = np.column_stack([kept[:, :2], np.ones(len(kept))])
+        plane = np.linalg.lstsq(design, kept[:, 2], rcond=None)[0]
+        spread = float(np.sqrt(((kept[:, 2] - design @ plane) ** 2).mean()))
+        everything = np.array(points)
+        residual = everything[:, 2] - np.column_stack([everything[:, :2], np.ones(len(points))]) @ plane
+        kept = everything[np.abs(residual) <= 2 * spread]
+    return float(plane[0]), float(plane[1]), float(plane[2]), spreads * spread
 
 
 def naive_changes(before: Image, after: Image) -> Counter[Pixel]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sec_lab.relations._kernels import Codes, Integers, Words, _first_lane
 
 Depth = NDArray[np.float32]
+Planes = NDArray[np.float64]
 
 
 @nb.njit(cache=True, nogil=True)
@@ -59,6 +60,7 @@ def border_steps(
     limit_m: float,
     skip: int,
     reach: int,
+    planes: Planes,
 ) -> tuple[Integers, Integers, Integers]:
     """Steps in depth along the common border of every pair of segments.
 
@@ -72,6 +74,9 @@ def border_steps(
         Largest step that is small.
     skip, reach : int
         Pixels next to the border that are passed over, and how many are averaged after them.
+    planes : (n, 4) float64
+        Of the segments, see :func:`sec_lab.relations._plane_kernels.planes_of`. What is nearer than they allow, on the
+        side whose plane is the farther one, is smear of the other side: there, the plane counts.
 
     Returns
     -------
@@ -98,7 +103,8 @@ def border_steps(
             after = _side(codes, depth_m, row, column, 0, 1, width, skip, reach)
             if before > 0 and after > 0:
                 i, j = segment_of[codes[row, column - 1]], segment_of[codes[row, column]]
-                _count(known, small, in_front, i, j, before, after, limit_m)
+                x, y = column / width, row / height
+                _count(known, small, in_front, i, j, before, after, planes, x, y, limit_m)
         if row == 0:
             continue
         for k in range(n_words):
@@ -112,16 +118,34 @@ def border_steps(
                     after = _side(codes, depth_m, row, column, 1, 0, width, skip, reach)
                     if before > 0 and after > 0:
                         i, j = segment_of[codes[row - 1, column]], segment_of[codes[row, column]]
-                        _count(known, small, in_front, i, j, before, after, limit_m)
+                        x, y = column / width, row / height
+                        _count(known, small, in_front, i, j, before, after, planes, x, y, limit_m)
     return known, small, in_front
 
 
 @nb.njit(cache=True, nogil=True)
 def _count(
-    known: Integers, small: Integers, in_front: Integers, i: int, j: int, before: float, after: float, limit_m: float
+    known: Integers,
+    small: Integers,
+    in_front: Integers,
+    i: int,
+    j: int,
+    before: float,
+    after: float,
+    planes: Planes,
+    x: float,
+    y: float,
+    limit_m: float,
 ) -> None:
     known[i, j] += 1
     known[j, i] += 1
+    if abs(before - after) <= limit_m:
+        one = planes[i, 0] * x + planes[i, 1] * y + planes[i, 2]
+        other = planes[j, 0] * x + planes[j, 1] * y + planes[j, 2]
+        if 0 < one < other and 1 / before - one > planes[i, 3]:
+            before = 1 / one
+        elif 0 < other < one and 1 / after - other > planes[j, 3]:
+            after = 1 / other
     if abs(before - after) <= limit_m:
         small[i, j] += 1
         small[j, i] += 1

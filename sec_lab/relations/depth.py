@@ -120,12 +120,13 @@ def depth_steps(
         raise ValueError(f"skip_px: expected a number from 0 on, got {skip_px}")
     codes, width, values = coded_image(as_label_image(labels))
     depth = as_depth(depth_m, shape=(len(codes), width))
-    from sec_lab.relations import _border_kernels, _kernels
+    from sec_lab.relations import _border_kernels, _kernels, _plane_kernels
 
     words = codes.view(np.uint64)
     starts, first_run, segments = _kernels.find_runs(codes, words, width)
+    planes = _plane_kernels.no_planes(len(segments))
     counted = _border_kernels.border_steps(
-        codes, words, width, starts, first_run, segments, depth, step_m, skip_px, REACH_PX
+        codes, words, width, starts, first_run, segments, depth, step_m, skip_px, REACH_PX, planes
     )
     return DepthSteps(segments if values is None else values[segments], *counted)
 

@@ -236,7 +236,9 @@ class _State:
         calm = rests & ~covered
         self.rest_place[slots[calm]] = seen.centres[calm]
 
-        touching, sure = seen.touching, seen.sure
+        # Of what rests where depth has never been known, the picture alone decides.
+        state = self.pairs[np.minimum.outer(slots, slots), np.maximum.outer(slots, slots), kernels.STATE]
+        touching, sure = seen.touching, seen.sure | ((state == kernels.UNDECIDED) & calm[:, None] & calm)
         hidden = seen.pixels < p.visible_share * self.largest[slots]
         sure &= ~(hidden[:, None] | hidden)
         ground = np.arange(len(slots)) == seen.pixels.argmax()
@@ -320,7 +322,7 @@ class _State:
 def _evidence(
     codes: NDArray[np.uint8 | np.uint16], width: int, depth_m: ArrayLike | None, p: TimeParameters
 ) -> _Evidence:
-    from sec_lab.relations import _border_kernels, _kernels
+    from sec_lab.relations import _border_kernels, _kernels, _plane_kernels
 
     words = codes.view(np.uint64)
     starts, first_run, labels = _kernels.find_runs(codes, words, width)
@@ -331,8 +333,11 @@ def _evidence(
     sure = np.ones(hints.shape, np.bool_)
     if depth_m is not None and p.step_m is not None:
         depth = as_depth(depth_m, shape=(len(codes), width))
+        planes = _plane_kernels.no_planes(len(labels))
+        if p.smear_spreads is not None:
+            planes = _plane_kernels.planes_of(codes, width, labels, depth, p.smear_spreads)
         known, small, _ = _border_kernels.border_steps(
-            codes, words, width, starts, first_run, labels, depth, p.step_m, p.skip_px, REACH_PX
+            codes, words, width, starts, first_run, labels, depth, p.step_m, p.skip_px, REACH_PX, planes
         )
         touching = np.where(known > 0, touching_2d * small / np.maximum(known, 1), touching_2d)
         sure = (hints == 0) | told(known, hints)

@@ -36,6 +36,12 @@ class TimeParameters:
         :data:`~sec_lab.relations.depth.CONTACT_STEP_M`. None: depth is not used.
     skip_px : int
         See :data:`~sec_lab.relations.depth.SKIP_PX`.
+    smear_spreads : float or None
+        Stereo smears the nearer of two surfaces over the farther one, far over one without texture. So where segments
+        seem to be in contact by depth, what is nearer than the plane through its segment, by more than so many spreads
+        of the segment about it, is smear, and the depth of the plane counts; on the side whose plane is the farther
+        one. It parts what seems to touch and never the other way round. None: depth as it was
+        measured.
     hold_frames : int
         A segment that is hidden keeps its relations for so many frames; then it is absent. 0: absent at once.
     leaving_share : float
@@ -96,6 +102,7 @@ class TimeParameters:
     overlapping_thresholds: tuple[float, float] = (0.3, 0.5)
     step_m: float | None = CONTACT_STEP_M
     skip_px: int = SKIP_PX
+    smear_spreads: float | None = 1.5
     hold_frames: int = 60
     leaving_share: float = 0.5
     crumb_share: float = 0.02
@@ -115,7 +122,7 @@ class TimeParameters:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
                 raise ValueError(f"{name}: expected a whole number from {least} on, got {value!r}")
-        for name in ("step_m", "rest_px"):
+        for name in ("step_m", "smear_spreads", "rest_px"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name}: expected a finite number from 0 on or None, got {value!r}")
@@ -134,6 +141,7 @@ PICTURE_ALONE = TimeParameters(
     touching_thresholds=(0.02, 0.02),
     overlapping_thresholds=(0.4, 0.4),
     step_m=None,
+    smear_spreads=None,
     hold_frames=0,
     visible_share=0.0,
     leaving_share=1.0,

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from sec_lab.codes import Relation
 from sec_lab.relations import CONTACT_STEP_M, depth_steps, overlap_kind, relations_by_depth, scan_line_relations
-from sec_lab.relations._border_kernels import changed_pixels
+from sec_lab.relations._border_kernels import border_steps, changed_pixels
+from sec_lab.relations._kernels import find_runs
+from sec_lab.relations._plane_kernels import no_planes, planes_of
 from sec_lab.relations.counts import coded_image
-from tests.naive_depth import naive_changes, naive_steps
+from tests.naive_depth import naive_changes, naive_plane, naive_steps
 
 TABLE, CUP, HAND, SPECK = 1, 2, 3, 4
 N, O, T = Relation.NON_TOUCHING, Relation.OVERLAPPING, Relation.TOUCHING  # noqa: E741
@@ -141,6 +143,46 @@ def test_steps_as_the_slow_reference_counts_them(data: st.DataObject, dtype: typ
     values = steps.segments.tolist()
     for counted, expected in ((steps.known, known), (steps.small, small), (steps.in_front, in_front)):
         assert counted.tolist() == [[expected[i, j] for j in values] for i in values]
+
+
+@given(data=st.data(), spreads=st.floats(0, 3))
+def test_steps_beside_planes_as_the_slow_reference_counts_them(data: st.DataObject, spreads: float) -> None:
+    cells = data.draw(hnp.arrays(np.uint8, (3, 4), elements=st.integers(0, 3)))
+    labels = np.kron(cells, np.ones((5, 6), np.uint8))
+    depth_m = data.draw(hnp.arrays(np.float32, labels.shape, elements=st.sampled_from([0.0, 0.5, 0.75, 1.0])))
+    codes, width, _ = coded_image(labels)
+    words = codes.view(np.uint64)
+    starts, first_run, values = find_runs(codes, words, width)
+    numbers = st.sampled_from([0.0, 0.5, 1.0, 1.5, 2.0])
+    planes = data.draw(hnp.arrays(np.float64, (len(values), 4), elements=numbers))
+    planes[:, 3] *= spreads
+    found = border_steps(codes, words, width, starts, first_run, values, depth_m, 0.3, 1, 3, planes)
+    fits = dict(zip(values.tolist(), map(tuple, planes.tolist()), strict=True))
+    expected = naive_steps(labels.tolist(), depth_m.tolist(), step_m=0.3, skip=1, planes=fits)
+    for counted, wanted in zip(found, expected, strict=True):
+        assert counted.tolist() == [[wanted[i, j] for j in values.tolist()] for i in values.tolist()]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_planes_as_the_slow_reference_finds_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    labels = np.kron(rng.integers(1, 5, (3, 4)), np.ones((20, 24), np.uint8)).astype(np.uint8)
+    labels[:4, :5] = 9  # too few pixels
+    height, width = labels.shape
+    y, x = np.mgrid[:height, :width] / np.array([height, width])[:, None, None]
+    inverse = 1 + 0.2 * (labels % 3) + 0.3 * x - 0.1 * y + rng.normal(0, 0.01, labels.shape)
+    inverse[rng.random(labels.shape) < 0.1] += 0.3  # smear
+    depth_m = np.where(rng.random(labels.shape) < 0.1, 0, 1 / inverse).astype(np.float32)
+    codes, padded, _ = coded_image(labels)
+    values = np.unique(labels).astype(np.int64)
+    found = planes_of(codes, padded, values, depth_m, 1.5)
+    seen = np.zeros(labels.shape, np.bool_)
+    seen[::2, ::2] = True
+    for plane, label in zip(found, values, strict=True):
+        rows, columns = np.nonzero(seen & (labels == label) & (depth_m > 0))
+        points = list(zip(columns / width, rows / height, 1 / depth_m[rows, columns].astype(float), strict=True))
+        np.testing.assert_allclose(plane, naive_plane(points, 1.5), rtol=1e-6)
+    assert found[-1].tolist() == no_planes(1)[0].tolist()
 
 
 @given(data=st.data(), dtype=st.sampled_from([np.uint8, np.uint16]))

@@ -234,6 +234,26 @@ def test_depth_parts_what_meets_in_the_picture() -> None:
     assert story(list(steady_relations(frames, parameters=TimeParameters(step_m=None))), CUP, SPECK) == [(0, T)]
 
 
+def test_what_rests_where_depth_is_never_known_is_told_by_the_picture() -> None:
+    """At the side of a stereo picture that the other eye does not see."""
+    labels = picture(cup=CUP_AT)
+    depth_m = np.where(labels == CUP, 0.0, 1.0)
+    assert story(list(steady_relations([(number, labels, depth_m) for number in range(20)])), TABLE, CUP) == [(0, O)]
+    moving = [SeenFrame(number, labels, depth_m, {CUP}) for number in range(20)]
+    assert story(list(steady_relations(moving)), TABLE, CUP) == [(0, N)]
+
+
+@pytest.mark.parametrize(("rule", "expected"), [(None, T), (1.5, N)])
+def test_smear_over_a_plain_surface_is_no_contact(rule: float | None, expected: Relation) -> None:
+    """A hand 10 cm above a plate: for 7 pixels around it the plate seems as near as the hand."""
+    labels = picture(cup=(5, 75, 20, 100), hand=(30, 50, 70, 120))
+    depth_m = np.where(labels == HAND, 0.9, 1.0)
+    depth_m[23:57, 63:70] = depth_m[23:30, 70:100] = depth_m[50:57, 70:100] = 0.9
+    frames = [SeenFrame(number, labels, depth_m, {CUP, HAND}) for number in range(20)]
+    parameters = TimeParameters(smear_spreads=rule)
+    assert story(list(steady_relations(frames, parameters=parameters)), CUP, HAND) == [(0, expected)]
+
+
 def test_events_that_nearly_coincide_share_a_key_frame() -> None:
     first = picture(cup=CUP_AT, speck=(30, 50, 70, 90))
     second = picture(cup=CUP_AT, speck=(30, 50, 60, 90))
@@ -306,6 +326,7 @@ def test_parameters_follow_the_frame_rate() -> None:
         ({"min_life_frames": 0}, "min_life_frames: expected a whole number from 1 on, got 0"),
         ({"hold_frames": 2.5}, "hold_frames: expected a whole number from 0 on, got 2.5"),
         ({"step_m": float("nan")}, "step_m: expected a finite number from 0 on or None, got nan"),
+        ({"smear_spreads": -1.0}, "smear_spreads: expected a finite number from 0 on or None, got -1.0"),
         ({"visible_share": 1.5}, "visible_share: expected a share from 0 to 1, got 1.5"),
         ({"touching_thresholds": (0.3, 0.1)}, r"touching_thresholds: expected .* got \(0.3, 0.1\)"),
     ],

@@ -30,6 +30,7 @@ RULES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "segments must live": ("min_life_frames",),
         "hidden segments are held": ("hold_frames", "leaving_share", "crumb_share"),
         "depth parts": ("step_m",),
+        "smear is no contact": ("smear_spreads",),
         "hardly visible says nothing": ("visible_share",),
         "contact by motion": ("rest_px", "contact_by_motion"),
         "carried things touch": ("carried",),
