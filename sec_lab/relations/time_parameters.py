@@ -40,8 +40,7 @@ class TimeParameters:
         Stereo smears the nearer of two surfaces over the farther one, far over one without texture. So where segments
         seem to be in contact by depth, what is nearer than the plane through its segment, by more than so many spreads
         of the segment about it, is smear, and the depth of the plane counts; on the side whose plane is the farther
-        one. It parts what seems to touch and never the other way round. None: depth as it was
-        measured.
+        one. It parts what seems to touch and never the other way round. None: depth as it was measured.
     hold_frames : int
         A segment that is hidden keeps its relations for so many frames; then it is absent. 0: absent at once.
     leaving_share : float

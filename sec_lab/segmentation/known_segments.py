@@ -19,6 +19,9 @@ CLEARLY = 2.0
 SURELY = 1.0
 """By so much where its place speaks for it, too, or where it fits well by itself."""
 
+_HIDDEN = 0.3
+"""A segment that shows less than this share of its largest area is hidden."""
+
 _NEVER = -(1 << 40)
 _JUST_MOVED_FRAMES = 50
 """Two seconds in which parts that a hand has hidden still come to light, after what it has carried has come to rest."""
@@ -171,12 +174,15 @@ class KnownSegments:
         resting, recognised, covered, visible, elsewhere = counts.T
         self.present = visible > 0
         self.most_px = np.maximum(visible, self.most_px)
-        self.hidden = self.known & (visible < 0.3 * self.most_px)
+        self.hidden = self.known & (visible < _HIDDEN * self.most_px)
         vacated = resting - recognised - covered
         bound = np.maximum(8, 0.12 * resting)
         starts = (resting > 0) & ((vacated > bound) | (self.touched & (elsewhere > bound)))
-        ends = (resting > 0) & (elsewhere <= np.maximum(8, 0.05 * resting)) & ~self.mover
+        # A piece that a hand leaves to be seen may settle; that is not yet the end of the way.
+        ends = (resting > _HIDDEN * self.most_px) & (elsewhere <= np.maximum(8, 0.05 * resting)) & ~self.mover
         self.moving = (self.moving & ~ends) | starts
+        if not (self.mover & self.present).any():
+            self.moving &= ~self.hidden  # what nobody carries any more has been carried away
         self.moving[:2] = False
         self.moving &= self.known
         self.moved_at[self.moving] = self.n_steps

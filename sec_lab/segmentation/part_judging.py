@@ -18,6 +18,7 @@ _PAUSE_FRAMES = 3
 # Shares of the rim of a part that borders on a segment, and of its area where a segment was expected.
 _HARDLY_BESIDE, _BESIDE, _LARGELY_BESIDE = 0.03, 0.1, 0.25
 _EXPECTED = 0.2
+_LARGELY_BELOW = 0.3
 
 # In the unit of costs, nats per pixel (see LayerParameters).
 _OUT_OF_PLACE = 6.0
@@ -168,7 +169,7 @@ class Judge:
         p, segments = self.parameters, self.segments
         # Where a segment has gone away, what it lay on comes to light.
         gone = segments.moving & ~segments.mover & (part.around < 0.2)
-        if part.below[gone].sum() > 0.5:
+        if part.below[gone].sum() > _LARGELY_BELOW:
             if part.colour[1] < p.fitting_cost + 0.5:
                 return UNTAUGHT + 1
             support = int(np.argmax(part.around))
@@ -234,15 +235,18 @@ class Judge:
     def _comes_to_light(self, part: Part, slot: int) -> bool:
         """Whether a part is of a segment that is hidden, or that lacks it here: nothing else is nearly so like it."""
         segments = self.segments
-        bound = self.parameters.unknown_cost
+        bound, margin = self.parameters.unknown_cost, CLEARLY
         others = self._may_be_here(part)
         if segments.missing[slot] and part.around[slot] > _LARGELY_BESIDE:
             bound += CLEARLY
             others = part.around > _HARDLY_BESIDE
         elif segments.mover[slot] or not segments.hidden[slot]:
             return False
+        elif segments.moving[slot] and part.around[segments.mover].sum() > _LARGELY_BESIDE:
+            # A hand shows it again from another side; the less it is like itself, the less may be others.
+            bound, margin = (bound, SURELY) if part.colour[slot] < bound else (bound + CLEARLY, CLEARLY)
         others[slot] = False
-        fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - CLEARLY)
+        fits = part.colour[slot] < min(bound, part.colour[others].min(initial=np.inf) - margin)
         return bool(fits and part.area < 1.2 * segments.most_px[slot])
 
     def _may_be_here(self, part: Part) -> NDArray[np.bool_]:

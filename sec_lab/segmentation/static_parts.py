@@ -15,7 +15,7 @@ _SURROUNDED = 0.8
 _NARROW = 3
 _SOLID = 0.8
 _OTHER_HUE, _A_SHADE, _SAME_HUE = 20.0, 10.0, 5.0
-"""Distances of chroma in one light, 0 to 255: of pages and a cover; more than the shade in a cup makes; of one cloth."""
+"""Distances of chroma in one light, 0 to 255: of pages and their cover; more than a shade makes; of one cloth."""
 _BRIGHTER = 10.0
 _AT_BORDER = 0.15
 _NEAR_BORDER = 0.15

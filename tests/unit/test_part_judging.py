@@ -118,6 +118,14 @@ def test_what_a_thing_lay_on_comes_to_light_when_it_is_gone() -> None:
     assert judge.unknown(uncovered) > PLATE
 
 
+def test_a_third_of_a_part_where_a_thing_lay_is_enough_if_it_is_like_what_is_around() -> None:
+    _, judge = scene()
+    around = {PLATE: 0.95, TABLE: 0.05}
+    assert judge.unknown(part(around, {CUP: 0.4, PLATE: 0.6}, {PLATE: 10.5})) == UNTAUGHT + PLATE
+    assert judge.unknown(part(around, {CUP: 0.2, PLATE: 0.8}, {PLATE: 10.5})) > PLATE
+    assert judge.unknown(part(around, {CUP: 0.4, PLATE: 0.6}, {PLATE: 11.5})) > PLATE
+
+
 def with_hand(*, present: bool = True) -> tuple[KnownSegments, Judge, int]:
     segments, judge = scene()
     hand = segments.new(np.array([0, 0, 9, 9]), judge.slots, judge.rest, mover=True)
@@ -135,6 +143,38 @@ def test_a_hand_in_its_own_shade_is_most_like_a_hand() -> None:
     assert judge.unknown(rim) == UNTAUGHT
     as_like_the_plate = part({PLATE: 0.75, hand: 0.25}, {PLATE: 1.0}, {hand: 10.5, PLATE: 11.0}, unknown_for=0)
     assert judge.unknown(as_like_the_plate) == UNTAUGHT + PLATE
+
+
+@pytest.mark.parametrize(
+    ("cost", "other", "seen"),
+    [
+        pytest.param(11.5, 13.0, True, id="hardly like itself, others less"),
+        pytest.param(11.5, 12.0, False, id="others nearly as much"),
+        pytest.param(13.0, 15.5, True, id="unlike itself, others clearly more"),
+        pytest.param(13.0, 14.5, False, id="unlike itself, others hardly more"),
+        pytest.param(14.5, 16.0, False, id="quite unlike itself"),
+    ],
+)
+def test_a_hand_shows_what_it_carries_from_another_side(cost: float, other: float, seen: bool) -> None:
+    segments, judge, hand = with_hand()
+    segments.hidden[CUP] = segments.touched[PLATE] = True
+    turned = part({TABLE: 0.6, hand: 0.4}, {TABLE: 1.0}, {CUP: cost, PLATE: other}, unknown_for=0)
+    assert judge.unknown(turned) == (CUP if seen else UNTAUGHT + TABLE)
+    away = part({TABLE: 1.0}, {TABLE: 1.0}, {CUP: cost, PLATE: other}, unknown_for=0)
+    assert judge.unknown(away) == UNTAUGHT + TABLE
+
+
+def test_a_piece_that_settles_while_a_hand_hides_the_rest_is_still_on_the_way() -> None:
+    segments, _, hand = with_hand()
+    rest = np.full(SIZE, TABLE, np.uint8)
+    rest[20:30, 10:20] = CUP  # a quarter of it
+    seen = rest.copy()
+    seen[20:30, 20:40] = hand
+    segments.update(seen, seen, rest)
+    assert segments.moving[CUP]
+    rest[20:30, 10:40], seen[20:30, 10:40] = CUP, CUP
+    segments.update(seen, seen, rest)
+    assert not segments.moving[CUP]
 
 
 def test_a_rim_is_of_all_that_it_lies_between_and_a_patch_of_one() -> None:
