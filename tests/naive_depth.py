@@ -51,7 +51,7 @@ def naive_plane(points: list[tuple[float, float, float]], spreads: float) -> tup
     kept = np.array(points)
     plane, spread = np.zeros(3), np.inf
     for _ in range(5):
-        if len(kept) < 30:
+        if len(kept) < 30 or min(kept[:, 0].std(), kept[:, 1].std()) == 0:
             return 0.0, 0.0, 0.0, np.inf
         design = np.column_stack([kept[:, :2], np.ones(len(kept))])
         plane = np.linalg.lstsq(design, kept[:, 2], rcond=None)[0]

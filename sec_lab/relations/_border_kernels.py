@@ -75,8 +75,9 @@ def border_steps(
     skip, reach : int
         Pixels next to the border that are passed over, and how many are averaged after them.
     planes : (n, 4) float64
-        Of the segments, see :func:`sec_lab.relations._plane_kernels.planes_of`. What is nearer than they allow, on the
-        side whose plane is the farther one, is smear of the other side: there, the plane counts.
+        Of the segments, see :func:`sec_lab.relations._plane_kernels.planes_of`. Where the step is small and the side
+        whose plane is the farther one is nearer than that allows, this is smear of the other side, and the plane counts
+        at the border.
 
     Returns
     -------

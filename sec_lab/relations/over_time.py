@@ -236,9 +236,10 @@ class _State:
         calm = rests & ~covered
         self.rest_place[slots[calm]] = seen.centres[calm]
 
-        # Of what rests where depth has never been known, the picture alone decides.
+        # Of what rests where too little depth is known to have decided anything so far, the picture alone decides.
         state = self.pairs[np.minimum.outer(slots, slots), np.maximum.outer(slots, slots), kernels.STATE]
-        touching, sure = seen.touching, seen.sure | ((state == kernels.UNDECIDED) & calm[:, None] & calm)
+        untold = ~seen.sure & (state == kernels.UNDECIDED) & calm[:, None] & calm
+        touching, sure = np.where(untold, seen.touching_2d, seen.touching), seen.sure | untold
         hidden = seen.pixels < p.visible_share * self.largest[slots]
         sure &= ~(hidden[:, None] | hidden)
         ground = np.arange(len(slots)) == seen.pixels.argmax()

@@ -33,14 +33,16 @@ class TimeParameters:
         Normalized counters of A.1 (scan lines) that a relation needs to go on, and that it needs to begin. Equal: off.
     step_m : float or None
         Largest step in depth of segments in contact, where depth is known, see
-        :data:`~sec_lab.relations.depth.CONTACT_STEP_M`. None: depth is not used.
+        :data:`~sec_lab.relations.depth.CONTACT_STEP_M`. Where too little is known, a relation stays as it is; of what
+        rests from the beginning, the picture alone decides. None: depth is not used.
     skip_px : int
         See :data:`~sec_lab.relations.depth.SKIP_PX`.
     smear_spreads : float or None
         Stereo smears the nearer of two surfaces over the farther one, far over one without texture. So where segments
-        seem to be in contact by depth, what is nearer than the plane through its segment, by more than so many spreads
-        of the segment about it, is smear, and the depth of the plane counts; on the side whose plane is the farther
-        one. It parts what seems to touch and never the other way round. None: depth as it was measured.
+        seem to be in contact by depth, what is nearer than the plane through its segment, by more than so many standard
+        deviations of what lies close to it (in inverse depth), is smear, and the plane counts; on the side whose plane
+        is the farther one. It parts what seems to touch and never the other way round. 1.5: less than one pixel in ten
+        of a flat thing is nearer by its noise alone. None: depth as it was measured.
     hold_frames : int
         A segment that is hidden keeps its relations for so many frames; then it is absent. 0: absent at once.
     leaving_share : float

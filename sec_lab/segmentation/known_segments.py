@@ -182,7 +182,7 @@ class KnownSegments:
         ends = (resting > _HIDDEN * self.most_px) & (elsewhere <= np.maximum(8, 0.05 * resting)) & ~self.mover
         self.moving = (self.moving & ~ends) | starts
         if not (self.mover & self.present).any():
-            self.moving &= ~self.hidden  # what nobody carries any more has been carried away
+            self.moving &= ~self.hidden | self.mover  # what nobody carries any more has been carried away
         self.moving[:2] = False
         self.moving &= self.known
         self.moved_at[self.moving] = self.n_steps

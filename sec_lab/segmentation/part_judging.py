@@ -18,7 +18,9 @@ _PAUSE_FRAMES = 3
 # Shares of the rim of a part that borders on a segment, and of its area where a segment was expected.
 _HARDLY_BESIDE, _BESIDE, _LARGELY_BESIDE = 0.03, 0.1, 0.25
 _EXPECTED = 0.2
+
 _LARGELY_BELOW = 0.3
+"""Share of the area of a part where a thing was taken away; its other pixels are the shade of the hand around it."""
 
 # In the unit of costs, nats per pixel (see LayerParameters).
 _OUT_OF_PLACE = 6.0

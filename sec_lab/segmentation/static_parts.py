@@ -20,25 +20,30 @@ _BRIGHTER = 10.0
 _AT_BORDER = 0.15
 _NEAR_BORDER = 0.15
 _THICK, _VERY_THICK = 0.6, 0.75
-"""More than a rim, and more than a band: a rectangle of 2 to 1 has 0.63."""
+"""More than a rim, and more than a band, as shares of a disc: a rectangle of 2 to 1 has 0.63, one of 1.4 to 1 0.75."""
 
 _A_SIDE = 0.1
 
 
 def tidied(labels: Labels, least_px: int) -> Labels:
-    """Each connected region without holes an object of its own; what is too small belongs to the background."""
+    """Each connected region without holes an object of its own; what is too small belongs to the background.
+
+    So do all but the ``MAX_OBJECTS`` largest.
+    """
     import cv2
 
-    tidied = np.full_like(labels, BACKGROUND)
-    number = BACKGROUND
+    found: list[tuple[int, int, NDArray[np.bool_]]] = []
     for slot in np.unique(labels[labels > BACKGROUND]):
         n, parts, statistics, _ = cv2.connectedComponentsWithStats((labels == slot).astype(np.uint8), connectivity=8)
-        for part in range(1, n):
-            if statistics[part, cv2.CC_STAT_AREA] < least_px or number >= MAX_OBJECTS:
-                continue
-            filled = _filled(parts == part)
+        areas = statistics[:n, cv2.CC_STAT_AREA]
+        found += [(int(areas[k]), int(slot), parts == k) for k in range(1, n) if areas[k] >= least_px]
+    largest = set(sorted(range(len(found)), key=lambda k: -found[k][0])[:MAX_OBJECTS])
+    tidied = np.full_like(labels, BACKGROUND)
+    number = BACKGROUND
+    for k, (_, slot, part) in enumerate(found):
+        if k in largest:
             number += 1
-            tidied[filled & ((labels == slot) | (labels == BACKGROUND))] = number
+            tidied[_filled(part) & ((labels == slot) | (labels == BACKGROUND))] = number
     return tidied
 
 
@@ -98,11 +103,17 @@ def _differ(bins: NDArray[np.uint16], one: NDArray[np.bool_], other: NDArray[np.
 
 
 def with_things_on_top(
-    bins: NDArray[np.uint16], domains: NDArray[np.uint16], labels: Labels, rise: Floats, least_px: int
+    lab: NDArray[np.uint8],
+    bins: NDArray[np.uint16],
+    domains: NDArray[np.uint16],
+    labels: Labels,
+    rise: Floats,
+    least_px: int,
 ) -> Labels:
     """Regions in two where something of other colours rises out of them, surrounded by the rest: what is on a plate.
 
     Depth from matched windows reaches beyond borders, so that it only says which domains of colour belong to the thing.
+    Bands and caps near the border of the region stay, and what is thin and of one hue with it: a highlight.
     """
     import cv2
 
@@ -139,7 +150,8 @@ def with_things_on_top(
             if rest.sum() < least_px or not _is_surrounded(piece, region) or not _differ(bins, piece, rest, by=1.0):
                 continue
             # A band or a cap rises, too, where it is nearer to the camera than most of its thing.
-            if _near_border(piece, labels) or _thickness(piece) <= _THICK:
+            thin = _thickness(piece) <= _THICK and _hue_distance(lab, piece, rest) <= _A_SHADE
+            if thin or _near_border(piece, labels):
                 continue
             number += 1
             parted[piece] = number

@@ -23,7 +23,9 @@ from sec_lab.segmentation.static_parts import (
     with_things_on_top,
 )
 
-_STRANGE = 2.0
+_ALIKE, _STRANGE, _VERY_STRANGE = 0.5, 2.0, 3.0
+"""How unusual a thing is beyond what is typical, in nats: no more than the ground; a thing where depth is known, and
+where nothing else speaks for it."""
 
 
 def static_segments(
@@ -43,7 +45,7 @@ def static_segments(
     Returns
     -------
     (height, width) uint8
-        1 for the background, 2, 3, … for objects from left to right.
+        1 for the background, 2, 3, … for objects, in the main from left to right.
     """
     from sec_lab.segmentation import _layer_kernels as kernels
     from sec_lab.segmentation.potts import PottsParameters, superparamagnetic_clustering
@@ -60,7 +62,7 @@ def static_segments(
     domains = superparamagnetic_clustering(image, parameters=PottsParameters(minimum_size_px=max(10, least_px)))
     if rise is not None:
         # A neck between two like things shows when the one on top of the other is away.
-        whole = parted_at_necks(bins, with_things_on_top(bins, domains, whole, rise, least_px), least_px)
+        whole = parted_at_necks(bins, with_things_on_top(lab, bins, domains, whole, rise, least_px), least_px)
     return with_coloured_parts(lab, bins, domains, whole, rise, least_px)
 
 
@@ -141,8 +143,14 @@ def _confirmed(labels: Labels, unusual: Floats, rise: Floats | None) -> Labels:
         inside = labels == slot
         heights = rise[inside]
         heights = heights[np.isfinite(heights)]
-        raised = len(heights) > 0.4 * inside.sum() and np.median(heights) >= RISES
-        if not raised and np.median(unusual[inside]) < typical + _STRANGE:
+        strangeness = float(np.median(unusual[inside])) - typical
+        height = float(np.median(heights)) if len(heights) else 0.0
+        if len(heights) > 0.4 * inside.sum():
+            # What looks like what it lies on must rise more clearly than what does not.
+            real = strangeness >= _STRANGE or height >= (2 if strangeness < _ALIKE else 1) * RISES
+        else:
+            real = strangeness >= (_STRANGE if height >= RISES else _VERY_STRANGE)
+        if not real:
             confirmed[inside] = BACKGROUND
     return confirmed
 
@@ -182,7 +190,7 @@ def _seeds(unusual: Floats, rise: Floats | None, least_px: int) -> NDArray[np.in
             if known.mean() > 0.4:
                 if np.median(heights[known]) < 0.75 * RISES:
                     continue
-            elif np.median(unusual[inside]) < typical + 3.0:
+            elif np.median(unusual[inside]) < typical + _VERY_STRANGE:
                 continue
         number += 1
         seeds[inside] = number

@@ -177,6 +177,20 @@ def test_a_piece_that_settles_while_a_hand_hides_the_rest_is_still_on_the_way() 
     assert not segments.moving[CUP]
 
 
+def test_nothing_hidden_is_on_the_way_without_a_hand_and_a_hand_comes_back_at_work() -> None:
+    segments, _, hand = with_hand()
+    empty = np.full(SIZE, TABLE, np.uint8)
+    seen = empty.copy()
+    seen[:10, :10] = hand
+    segments.moving[CUP] = True
+    segments.update(seen, seen, empty)
+    assert segments.moving[[CUP, hand]].all()
+    segments.update(empty, empty, empty)
+    assert segments.moving[[CUP, hand]].tolist() == [False, True]
+    segments.update(seen, seen, empty)
+    assert hand in segments.candidates()
+
+
 def test_a_rim_is_of_all_that_it_lies_between_and_a_patch_of_one() -> None:
     _, judge = scene()
     between: tuple[dict[int, float], ...] = ({CUP: 0.6, PLATE: 0.4}, {TABLE: 1.0}, {CUP: 13.0, PLATE: 13.0})

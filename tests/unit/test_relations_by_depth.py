@@ -163,26 +163,32 @@ def test_steps_beside_planes_as_the_slow_reference_counts_them(data: st.DataObje
         assert counted.tolist() == [[wanted[i, j] for j in values.tolist()] for i in values.tolist()]
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_planes_as_the_slow_reference_finds_them(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    labels = np.kron(rng.integers(1, 5, (3, 4)), np.ones((20, 24), np.uint8)).astype(np.uint8)
+@pytest.mark.parametrize("spreads", [0.0, 1.5])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize(("cell", "step"), [((20, 25), 2), ((5, 15), 2), ((130, 129), 3)])
+def test_planes_as_the_slow_reference_finds_them(cell: tuple[int, int], step: int, dtype: type, spreads: float) -> None:
+    """Segments of many pixels and of few, in pictures narrower than their memory and so large that some do."""
+    rng = np.random.default_rng(cell)
+    labels = np.kron(rng.integers(1, 5, (3, 3)), np.ones(cell, dtype)).astype(dtype)
     labels[:4, :5] = 9  # too few pixels
+    labels[-1, :] = 11  # no more than a line
     height, width = labels.shape
     y, x = np.mgrid[:height, :width] / np.array([height, width])[:, None, None]
     inverse = 1 + 0.2 * (labels % 3) + 0.3 * x - 0.1 * y + rng.normal(0, 0.01, labels.shape)
     inverse[rng.random(labels.shape) < 0.1] += 0.3  # smear
     depth_m = np.where(rng.random(labels.shape) < 0.1, 0, 1 / inverse).astype(np.float32)
-    codes, padded, _ = coded_image(labels)
+    codes, _, _ = coded_image(labels)
     values = np.unique(labels).astype(np.int64)
-    found = planes_of(codes, padded, values, depth_m, 1.5)
+    found = planes_of(codes, width, values, depth_m, spreads)
     seen = np.zeros(labels.shape, np.bool_)
-    seen[::2, ::2] = True
-    for plane, label in zip(found, values, strict=True):
+    seen[::step, ::step] = True
+    expected = []
+    for label in values:
         rows, columns = np.nonzero(seen & (labels == label) & (depth_m > 0))
         points = list(zip(columns / width, rows / height, 1 / depth_m[rows, columns].astype(float), strict=True))
-        np.testing.assert_allclose(plane, naive_plane(points, 1.5), rtol=1e-6)
-    assert found[-1].tolist() == no_planes(1)[0].tolist()
+        expected.append(naive_plane(points, spreads))
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert found[-2].tolist() == found[-1].tolist() == no_planes(1)[0].tolist()
 
 
 @given(data=st.data(), dtype=st.sampled_from([np.uint8, np.uint16]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sec_lab.segmentation.static_parts import tidied
+from sec_lab.segmentation.static_parts import MAX_OBJECTS, tidied
 from sec_lab.segmentation.static_scene import rise_above_plane, static_segments
 from tests.drawn_scenes import BLUE, GREEN, HEIGHT, RED, TABLE, WIDTH, Block, Moment, drawn, plane
 
@@ -106,6 +106,16 @@ class TestStaticSegments:
         assert sorted(np.bincount(found.ravel())[1:].tolist()) == [400, 1600, HEIGHT * WIDTH - 2000]
         assert found[72, 62] == 1
 
+    def test_of_more_than_there_are_numbers_for_the_largest_stay(self) -> None:
+        labels = np.ones((130, 130), np.uint8)
+        for row in range(12):
+            for column in range(12):
+                labels[10 * row + 2 : 10 * row + 9, 10 * column + 2 : 10 * column + 9] = 2
+        labels[100:128, 100:128] = 3
+        found = tidied(labels, 40)
+        assert found.max() == 1 + MAX_OBJECTS
+        assert (found == found[110, 110]).sum() == 28 * 28
+
     def test_a_hole_is_filled(self) -> None:
         found = self.segments([Block((50, 60), RED, 40, 40), Block((50, 60), TABLE, 10, 10)])
         assert found[50, 60] == found[35, 45] == 2
@@ -148,15 +158,40 @@ class TestThingsOnThings:
         found, _ = self.segments(self.plate.colour, 9)
         assert set(np.unique(found)) == {1, 2}
 
-    def test_a_band_that_rises_stays_with_the_plate(self) -> None:
-        """What is nearer to the camera than most of its thing rises, too; a thing on top is as long as it is wide."""
+    def test_a_long_thing_is_one_and_a_highlight_is_none(self) -> None:
+        """A knife on a plate; and a gleam on it, which is of one hue with the plate."""
         found, _ = self.segments(RED, 9, size=(6, 34))
+        assert set(np.unique(found)) == {1, 2, 3}
+        found, _ = self.segments((150, 150, 147), 9, size=(6, 34))
+        assert set(np.unique(found)) == {1, 2}
+
+    def test_what_rises_near_the_border_is_a_band(self) -> None:
+        found, _ = self.segments(RED, 9, place=(34, 60), size=(12, 12))
         assert set(np.unique(found)) == {1, 2}
 
     def test_the_cap_of_a_bottle_stays_with_it(self) -> None:
         """It rises and has its own colour, but lies at the border of its region."""
         found, _ = self.segments(RED, 9, place=(33, 60))
         assert set(np.unique(found)) == {1, 2}
+
+
+class TestGround:
+    """What has the colours of the table."""
+
+    def segments(self, height: float, *, known: bool = True) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(3)
+        picture, _ = drawn(Moment([Block((48, 60), TABLE, 20, 20)]), rng.normal(0, 2, (HEIGHT, WIDTH, 3)))
+        inverse = 1 / plane() + rng.normal(0, 0.01, (HEIGHT, WIDTH))
+        inverse[38:58, 50:70] += 0.01 * height
+        depth = (1 / inverse).astype(np.float32)
+        if not known:
+            depth[30:66, 42:78] = 0
+        return static_segments(picture, depth_m=depth)
+
+    def test_it_must_rise_twice_as_much_to_be_a_thing(self) -> None:
+        assert set(np.unique(self.segments(12))) == {1, 2}
+        assert set(np.unique(self.segments(4.5))) == {1}
+        assert set(np.unique(self.segments(12, known=False))) == {1}
 
 
 class TestPartsOfAnotherHue:
@@ -193,6 +228,13 @@ class TestPartsOfAnotherHue:
         self, lower: float, parts: set[int]
     ) -> None:
         found, _ = self.segments(Block((48, 60), self.WHITE, 16, 18), lower=lower)
+        assert set(np.unique(found)) == parts
+
+    @pytest.mark.parametrize(("width", "parts"), [(20, {1, 2, 3}), (36, {1, 2})])
+    def test_what_is_large_near_the_border_is_a_part_if_it_is_thicker_than_a_band(
+        self, width: int, parts: set[int]
+    ) -> None:
+        found, _ = self.segments(Block((61, 60), self.WHITE, 20, width))
         assert set(np.unique(found)) == parts
 
     def test_what_is_lower_near_the_border_is_the_band_of_a_bottle(self) -> None:
