@@ -102,7 +102,8 @@ def test_upload_stop_explore_compare_and_save(lab: Lab, screenshot: Callable[...
     first = page.locator(".sec-lab-own-movie table tbody tr").first.inner_text()
     page.locator(".sec-lab-own-movie input[type=text]").nth(3).fill("seen_by_hand")
     button(page, "save").click()
-    page.get_by_text("seen_by_hand.graphml").wait_for()
+    # The list of files beside the notebook shows it, too, as soon as it looks anew.
+    page.locator("code", has_text="seen_by_hand.graphml").wait_for()
     screenshot(page.locator(".sec-lab-own-movie"), "own_movie")
     saved = read_observation(lab.folder / "seen_by_hand.graphml")
     assert saved.segments.tolist() == [1, 4, 5, 6]
