@@ -16,10 +16,12 @@ from sec_lab.relations import (
     SegmentRelations,
     TimeParameters,
     at_frame_rate,
+    depth_steps,
     scan_line_relations,
     steady_relations,
 )
 from sec_lab.relations._time_kernels import resting
+from sec_lab.relations.depth import LEAST_PLACES
 from tests.naive_depth import naive_rest
 from tests.naive_relations_over_time import naive_steady
 
@@ -238,6 +240,11 @@ def test_what_rests_where_depth_is_never_known_is_told_by_the_picture() -> None:
     """At the side of a stereo picture that the other eye does not see."""
     labels = picture(cup=CUP_AT)
     depth_m = np.where(labels == CUP, 0.0, 1.0)
+    assert story(list(steady_relations([(number, labels, depth_m) for number in range(20)])), TABLE, CUP) == [(0, O)]
+    # A few places say nothing, whatever they seem to say.
+    top, _, left, _ = CUP_AT
+    depth_m[top + 3 : top + 8, left + 12 : left + 15] = 0.5
+    assert 0 < depth_steps(labels, depth_m).known[0, 1] < LEAST_PLACES
     assert story(list(steady_relations([(number, labels, depth_m) for number in range(20)])), TABLE, CUP) == [(0, O)]
     moving = [SeenFrame(number, labels, depth_m, {CUP}) for number in range(20)]
     assert story(list(steady_relations(moving)), TABLE, CUP) == [(0, N)]

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sec_lab.segmentation.static_parts import MAX_OBJECTS, tidied
-from sec_lab.segmentation.static_scene import rise_above_plane, static_segments
+from sec_lab.segmentation.static_scene import _confirmed, rise_above_plane, static_segments
 from tests.drawn_scenes import BLUE, GREEN, HEIGHT, RED, TABLE, WIDTH, Block, Moment, drawn, plane
 
 
@@ -174,6 +174,20 @@ class TestThingsOnThings:
         found, _ = self.segments(RED, 9, place=(33, 60))
         assert set(np.unique(found)) == {1, 2}
 
+    def test_a_like_thing_beside_a_plate_is_told_from_it_by_what_lies_on_it(self) -> None:
+        """An orange on a plate, and one that seems to hang together with the plate: a neck between like colours."""
+        blocks = [
+            Block((48, 44), (225, 225, 220), 44, 44),
+            Block((48, 44), RED, 20, 20),
+            Block((48, 90), RED, 14, 14),
+            Block((48, 74), (225, 225, 220), 7, 18),
+        ]
+        rng = np.random.default_rng(3)
+        picture, truth = drawn(Moment(blocks), rng.normal(0, 2, (HEIGHT, WIDTH, 3)))
+        inverse = 1 / plane() + rng.normal(0, 0.01, (HEIGHT, WIDTH)) + 0.06 * (truth > 0) + 0.1 * (truth == 2)
+        found = static_segments(picture, depth_m=(1 / inverse).astype(np.float32))
+        assert len({int(found[48, 44]), int(found[30, 30]), int(found[48, 90]), 1}) == 4
+
 
 class TestGround:
     """What has the colours of the table."""
@@ -192,6 +206,36 @@ class TestGround:
         assert set(np.unique(self.segments(12))) == {1, 2}
         assert set(np.unique(self.segments(4.5))) == {1}
         assert set(np.unique(self.segments(12, known=False))) == {1}
+
+    @pytest.mark.parametrize(
+        ("strangeness", "height", "thing"),
+        [
+            (0.0, 7.0, True),
+            (0.0, 5.0, False),
+            (1.0, 5.0, True),
+            (1.0, 2.0, False),
+            (2.5, 0.0, True),
+            (2.5, None, False),
+            (3.5, None, True),
+        ],
+    )
+    def test_what_confirms_a_thing(self, strangeness: float, height: float | None, thing: bool) -> None:
+        """How unusual its colours are, in nats, and how far it rises, in units of the noise of depth; None: unknown."""
+        labels = np.ones((40, 60), np.uint8)
+        labels[10:20, 20:40] = 2
+        unusual = np.where(labels == 2, 8 + strangeness, 8).astype(np.float32)
+        rise = np.where(labels == 2, np.nan if height is None else height, 0).astype(np.float32)
+        assert (_confirmed(labels, unusual, rise) == 2).any() == thing
+
+    def test_a_little_that_is_known_to_rise_speaks_for_a_thing(self) -> None:
+        labels = np.ones((40, 60), np.uint8)
+        labels[10:20, 20:40] = 2
+        unusual = np.where(labels == 2, 10.5, 8).astype(np.float32)
+        rise = np.where(labels == 2, np.nan, 0).astype(np.float32)
+        rise[10:20, 20:24] = 4
+        assert (_confirmed(labels, unusual, rise) == 2).any()
+        rise[10:20, 20:24] = 1
+        assert not (_confirmed(labels, unusual, rise) == 2).any()
 
 
 class TestPartsOfAnotherHue:
