@@ -61,8 +61,9 @@ def static_segments(
         return whole
     domains = superparamagnetic_clustering(image, parameters=PottsParameters(minimum_size_px=max(10, least_px)))
     if rise is not None:
+        bare = with_things_on_top(lab, bins, domains, whole, rise, least_px)
         # A neck between two like things shows when the one on top of the other is away.
-        whole = parted_at_necks(bins, with_things_on_top(lab, bins, domains, whole, rise, least_px), least_px)
+        whole = parted_at_necks(bins, bare, least_px) if (bare != whole).any() else whole
     return with_coloured_parts(lab, bins, domains, whole, rise, least_px)
 
 
