@@ -44,7 +44,7 @@ def planes_of(codes: Codes, width: int, labels: Integers, depth_m: Depth, spread
     (n, 4) float64
         a, b, c, d of every segment: inverse depth a x + b y + c, with x and y in shares of the width and of the height,
         from the left and from the top, and the largest excess d that is allowed, in 1/m; 0, 0, 0 and infinite without a
-        plane: of fewer than 30 pixels that lie close to one.
+        plane: if of the pixels looked at, every second one each way or fewer, less than 30 lie close to one.
     """
     height, n = codes.shape[0], len(labels)
     # So many pixels are enough for a plane, however large the picture is.

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from sec_lab.files import UnusableFileError
 from sec_lab.segmentation import Segmentation
 from sec_lab.segmentation.masks import flatten, open_masks, open_objects, write_palette_pngs
+from tests.mask_files import images_of, refused
 
 LABELS = np.zeros((3, 4, 6), dtype=np.uint8)
 LABELS[:, 1:3, 1:3] = 1
@@ -43,19 +43,6 @@ def write_palette(folder: Path, labels: NDArray[np.uint8], *, first: int = 0, st
             folder / f"{first + step * place:05d}.png", image, bits=8, colours=3, palette=bytes(range(255, 225, -1))
         )
     return folder
-
-
-def images_of(segmentation: Segmentation) -> NDArray[np.uint16]:
-    return np.stack(list(segmentation))
-
-
-def refused(act: object, *parts: object, error: type[Exception] = UnusableFileError) -> None:
-    with pytest.raises(error) as raised:
-        act()  # type: ignore[operator]
-    message = str(raised.value)
-    assert "\n" not in message
-    for part in parts:
-        assert str(part) in message, message
 
 
 class TestPalette:
